@@ -1,0 +1,48 @@
+# make demo   sets everything up, inspects block-a in the virtual cell, prints where report.html is
+# make test   sets everything up, runs every check and test
+PYTHON ?= python3
+BIN := .venv/bin
+export OPENBLAS_NUM_THREADS ?= 2
+export OMP_NUM_THREADS ?= 2
+
+.PHONY: demo test check bench lock docs clean faults
+
+demo: .venv/.runtime
+	$(BIN)/eddyscan demo --out inspections/demo
+
+test: .venv/.dev check
+	$(BIN)/pytest -n 2 --dist loadfile -q
+
+check: .venv/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: .venv/.runtime
+	$(BIN)/python -m benchmarks.line
+
+.venv/bin/pip:
+	$(PYTHON) -m venv .venv
+
+.venv/.runtime: requirements.lock pyproject.toml tools/system-libraries.sh | .venv/bin/pip
+	sh tools/system-libraries.sh
+	test -e .venv/.dev || $(BIN)/pip install --quiet --require-hashes --only-binary :all: -r requirements.lock
+	$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@
+
+.venv/.dev: requirements-dev.lock pyproject.toml tools/system-libraries.sh | .venv/bin/pip
+	sh tools/system-libraries.sh --with-browser
+	$(BIN)/pip install --quiet --require-hashes --only-binary :all: -r requirements-dev.lock
+	$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@ .venv/.runtime
+
+# Pins: names, versions and hashes, no index address. Needs uv on the PATH.
+lock:
+	uv pip compile --universal --generate-hashes --no-header --no-annotate --python-version 3.11 \
+		pyproject.toml -o requirements.lock
+	uv pip compile --universal --generate-hashes --no-header --no-annotate --python-version 3.11 \
+		--group dev pyproject.toml -c requirements.lock -o requirements-dev.lock
+
+clean:
+	rm -rf .venv build dist site src/*.egg-info
