@@ -40,9 +40,9 @@ bench: .venv/.runtime
 # Pins: names, versions and hashes, no index address. Needs uv on the PATH.
 lock:
 	uv pip compile --universal --generate-hashes --no-header --no-annotate --python-version 3.11 \
-		pyproject.toml -o requirements.lock
+		--group build pyproject.toml -o requirements.lock
 	uv pip compile --universal --generate-hashes --no-header --no-annotate --python-version 3.11 \
-		--group dev pyproject.toml -c requirements.lock -o requirements-dev.lock
+		--group build --group dev pyproject.toml -c requirements.lock -o requirements-dev.lock
 
 clean:
 	rm -rf .venv build dist site src/*.egg-info

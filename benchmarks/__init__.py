@@ -1,0 +1,1 @@
+"""Measurements: each module prints a table, side by side with a baseline, and may write docs/validation.md."""
