@@ -83,7 +83,8 @@ class Probe(Section):
     turns: int = Field(100, ge=1)
     tip: Literal["flat", "ball"] = "ball"
     tip_radius_mm: float = Field(1.6, gt=0, description="face radius of a flat tip, sphere radius of a ball tip")
-    body_radius_mm: float = Field(4.0, gt=0, description="cylinder behind the tip")
+    stem_length_mm: float = Field(10.0, ge=0, description="stem of the tip's radius between tip and body")
+    body_radius_mm: float = Field(4.0, gt=0, description="cylinder behind the stem")
     body_length_mm: float = Field(40.0, gt=0)
 
     @model_validator(mode="after")
