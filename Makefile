@@ -1,5 +1,8 @@
 # make demo   sets everything up, inspects block-a in the virtual cell, prints where report.html is
 # make test   sets everything up, runs every check and test
+# make bench  times each step of the line and the reference study's method beside it
+# make docs   builds the documentation site into site/
+# make faults the long fault campaign of the scan
 PYTHON ?= python3
 BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 2
@@ -22,6 +25,9 @@ check: .venv/.dev
 bench: .venv/.runtime
 	$(BIN)/python -m benchmarks.line
 
+faults: .venv/.dev
+	$(BIN)/python -m benchmarks.faults
+
 .venv/bin/pip:
 	$(PYTHON) -m venv .venv
 
@@ -36,6 +42,10 @@ bench: .venv/.runtime
 	$(BIN)/pip install --quiet --require-hashes --only-binary :all: -r requirements-dev.lock
 	$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@ .venv/.runtime
+
+docs: .venv/.dev
+	$(BIN)/python tools/reference_pages.py docs/reference
+	$(BIN)/mkdocs build --strict --quiet
 
 # Pins: names, versions and hashes, no index address. Needs uv on the PATH.
 lock:
