@@ -1,0 +1,10 @@
+"""Run a plan on a stage: check everything first, then move, read and keep every reading.
+
+This room alone holds a plan and a device at the same time; it sees the
+protocols, never a driver or a simulator.
+"""
+
+from eddyscan.scanning.checking import check
+from eddyscan.scanning.running import run
+
+__all__ = ["check", "run"]

@@ -1,0 +1,111 @@
+"""Run a plan: whatever happens, the axes end stopped, the probe lifted and the record whole."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+
+from eddyscan.core.errors import TechniqueError
+from eddyscan.core.frames import Array, checked_transform
+from eddyscan.core.plan import ScanPlan
+from eddyscan.core.progress import Progress, silent
+from eddyscan.core.technique import Technique
+from eddyscan.devices.protocols import Clock, EddyInstrument, RecordSink, Stage
+from eddyscan.scanning.checking import check
+from eddyscan.scanning.stepping import scan_in_steps
+from eddyscan.scanning.targets import stage_targets, travel_height_mm, with_z
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One run of one plan: the values and devices every mode of scanning needs.
+
+    `targets` are the axis readings (N, 3) [mm, stage] of the plan's poses,
+    `height_mm` the z reading at which the probe crosses over the part.
+    """
+
+    plan: ScanPlan
+    stage: Stage
+    instrument: EddyInstrument
+    clock: Clock
+    sink: RecordSink
+    technique: Technique
+    targets: Array
+    height_mm: float
+    began_s: float
+    progress: Progress = field(default=silent)
+
+
+def run(
+    plan: ScanPlan,
+    *,
+    stage: Stage,
+    instrument: EddyInstrument,
+    clock: Clock,
+    sink: RecordSink,
+    technique: Technique,
+    T_stage_part: Array,
+    progress: Progress = silent,
+) -> None:
+    """Take every reading of the plan that the sink does not hold yet.
+
+    Parameters
+    ----------
+    plan : ScanPlan
+        Poses in the part frame.
+    T_stage_part : (4, 4)
+        Pose of the part on the stage.
+    sink : RecordSink
+        Readings are durable when its `write` returns; it is left open.
+    clock : Clock
+        The rig's clock, shared by the stage and the instrument.
+
+    Raises
+    ------
+    TravelError
+        Before anything moves.
+    DeviceError, ScanAborted, KeyboardInterrupt, ...
+        After the axes were stopped and the probe lifted; what was read is kept.
+    """
+    check(plan, stage.axes(), T_stage_part, technique)
+    targets = stage_targets(plan, checked_transform(T_stage_part, "the part's pose on the stage"))
+    height = travel_height_mm(targets, stage.axes(), technique)
+    scan = Scan(plan, stage, instrument, clock, sink, technique, targets, height, clock.now(), progress)
+    _note_settings(scan, T_stage_part)
+    with _always_safe(scan):
+        if not stage.is_homed():
+            stage.home()
+        instrument.configure(technique.drive)
+        if technique.scan.mode != "step":
+            raise TechniqueError(f'scan mode {technique.scan.mode!r} is not built yet; use mode = "step".')
+        scan_in_steps(scan)
+
+
+def _note_settings(scan: Scan, T_stage_part: Array) -> None:
+    scan.sink.note("T_stage_part", checked_transform(T_stage_part, "the part's pose").tolist())
+    scan.sink.note("stage", asdict(scan.stage.identity()))
+    scan.sink.note("axes", [asdict(axis) for axis in scan.stage.axes()])
+    scan.sink.note("instrument", asdict(scan.instrument.identity()))
+    scan.sink.note("scan", scan.technique.scan.model_dump())
+
+
+@contextlib.contextmanager
+def _always_safe(scan: Scan) -> Iterator[None]:
+    """Stop the axes and lift the probe whatever ends the scan; the first fault is the one that is told."""
+    try:
+        yield
+        lift(scan)
+    except BaseException:
+        with contextlib.suppress(Exception):
+            scan.stage.stop()
+        with contextlib.suppress(Exception):
+            lift(scan)
+        raise
+
+
+def lift(scan: Scan) -> None:
+    """Raise the probe to the travelling height, straight up from wherever it is."""
+    here = scan.stage.position()
+    if here[2] < scan.height_mm:
+        scan.stage.move(with_z(here, scan.height_mm))

@@ -1,0 +1,86 @@
+"""The study's way: move, settle, read, store - one point after the other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from eddyscan.core.frames import Array, IntArray
+from eddyscan.core.plan import SCAN
+from eddyscan.core.record import POSITION_DOUBTFUL, Reading
+from eddyscan.scanning.targets import with_z
+
+if TYPE_CHECKING:
+    from eddyscan.scanning.running import Scan
+
+
+def scan_in_steps(scan: Scan) -> None:
+    """Visit the plan's poses in order; a pose whose reading exists is not visited again."""
+    done = scan.sink.done()
+    plan, at = scan.plan, -1
+    has_reading = [(int(r), int(p)) in done for r, p in zip(plan.row, plan.point, strict=True)]
+    for count, leg in enumerate(legs(plan.kind, has_reading), len(done) + 1):
+        for index in leg:
+            if index != at + 1 or at < 0:
+                hop(scan, scan.targets[index])
+            else:
+                scan.stage.move(scan.targets[index], float(plan.speed_mm_s[index]) or None)
+            at = index
+        read_point(scan, at)
+        scan.progress("scan", count, plan.n_scan)
+
+
+def legs(kind: IntArray, has_reading: list[bool]) -> list[list[int]]:
+    """Group the pose numbers still to visit: each leg ends at a point that lacks its reading.
+
+    Links and approaches belong to the leg they lead into; those that only lead
+    to points already read are left out.
+    """
+    out: list[list[int]] = []
+    leading: list[int] = []
+    for index, what in enumerate(kind):
+        if what != SCAN:
+            leading.append(index)
+        elif has_reading[index]:
+            leading = []
+        else:
+            out.append([*leading, index])
+            leading = []
+    return out
+
+
+def hop(scan: Scan, target: Array) -> None:
+    """Go to a pose from anywhere: up, across, and down last and slowly."""
+    here = scan.stage.position()
+    height = max(scan.height_mm, float(target[2]))
+    if here[2] < height:
+        scan.stage.move(with_z(here, height))
+        here = with_z(here, height)
+    above = with_z(target, max(height, float(here[2])))
+    scan.stage.move(above)
+    scan.stage.move(target, scan.technique.scan.approach_speed_mm_s)
+
+
+def read_point(scan: Scan, index: int) -> None:
+    """Settle, read the impedance and the axes, and make the reading durable."""
+    scan.clock.sleep(scan.technique.scan.settle_s)
+    heard = scan.instrument.read()
+    position = scan.stage.position()[:3]
+    target = scan.targets[index]
+    flag = heard.flag
+    if np.abs(position - target).max() > scan.technique.scan.position_tolerance_mm:
+        flag |= POSITION_DOUBTFUL
+    x, y, z = (float(v) for v in position)
+    tx, ty, tz = (float(v) for v in target)
+    reading = Reading(
+        row=int(scan.plan.row[index]),
+        point=int(scan.plan.point[index]),
+        time_s=heard.time_s - scan.began_s,
+        stage_mm=(x, y, z),
+        frequency_hz=scan.technique.drive.frequency_hz,
+        impedance_ohm=heard.impedance_ohm,
+        flag=flag,
+        target_mm=(tx, ty, tz),
+    )
+    scan.sink.write([reading])
