@@ -1,0 +1,31 @@
+"""In which order strokes are run, and which way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eddyscan.planning.strokes import Stroke
+
+
+def boustrophedon(strokes: list[Stroke]) -> list[Stroke]:
+    """Return strokes in the given order, each turned so that it begins near the end before it."""
+    if not strokes:
+        return []
+    run = [strokes[0]]
+    for stroke in strokes[1:]:
+        at = run[-1].points[0] if run[-1].closed else run[-1].points[-1]
+        if stroke.closed:
+            run.append(_begun_near(stroke, at))
+            continue
+        ahead, back = np.linalg.norm(stroke.points[0] - at), np.linalg.norm(stroke.points[-1] - at)
+        run.append(stroke.reversed() if back < ahead else stroke)
+    return run
+
+
+def _begun_near(stroke: Stroke, at: np.ndarray) -> Stroke:
+    """Return a closed stroke that begins at its reading nearest to `at`."""
+    k = int(np.argmin(np.linalg.norm(stroke.points - at, axis=1)))
+    if k == 0:
+        return stroke
+    points, normals = np.roll(stroke.points, -k, axis=0), np.roll(stroke.normals, -k, axis=0)
+    return Stroke(points, normals, stroke.s_mm, stroke.path, stroke.path_normals, stroke.level, True)

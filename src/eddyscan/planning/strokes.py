@@ -1,0 +1,94 @@
+"""Strokes: points at equal arc length along lines on the smooth surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eddyscan.core.frames import Array
+from eddyscan.planning.levels import Line
+from eddyscan.planning.smooth import SmoothSurface
+
+TRIM_OF_STEP = 0.05
+SPACING_OF_STEP = 0.008
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One row, or a piece of one, in running order.
+
+    Attributes
+    ----------
+    points, normals : (N, 3) where readings are taken [mm], unit outward
+    s_mm : (N,) arc length from the first point
+    path, path_normals : (M, 3) the line in between, finely
+    level : float, of the row's field
+    closed : bool
+        The last point is followed by the first; points are not repeated.
+    """
+
+    points: Array
+    normals: Array
+    s_mm: Array
+    path: Array
+    path_normals: Array
+    level: float
+    closed: bool
+
+    @property
+    def length_mm(self) -> float:
+        """Return the length [mm] of the path."""
+        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+
+    def reversed(self) -> Stroke:
+        """Return the stroke run the other way."""
+        s = self.s_mm[-1] - self.s_mm[::-1]
+        return Stroke(
+            self.points[::-1], self.normals[::-1], s, self.path[::-1], self.path_normals[::-1], self.level, self.closed
+        )
+
+
+def surface_distance(p: Array, q: Array, n_p: Array, n_q: Array) -> Array:
+    """Return the distance on the surface between near points from the chord and both normals.
+
+    A circular arc over the chord that turns by the angle between the normals.
+    """
+    chord = np.linalg.norm(q - p, axis=-1)
+    half = 0.5 * np.arccos(np.clip(np.einsum("...k,...k->...", n_p, n_q), -1, 1))
+    return np.asarray(chord * np.where(half > 1e-6, half / np.maximum(np.sin(half), 1e-12), 1.0))
+
+
+def stroke_from_line(line: Line, surface: SmoothSurface, step_mm: float) -> Stroke | None:
+    """Return readings every `step_mm` of arc length along a line, or None when it is a mere speck.
+
+    The remainder is spread: the step becomes length / round(length / step). Up
+    to 5 % of a step is left at each end when that brings the steps closer to
+    what was asked.
+    """
+    path, path_normals = _lifted(line, surface)
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    s = np.concatenate([[0.0], np.cumsum(length)])
+    if s[-1] < 0.02 * step_mm:
+        return None
+    at = _stations(float(s[-1]), step_mm, closed=line.closed)
+    segment = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(length) - 1)
+    t = (at - s[segment]) / np.maximum(length[segment], 1e-12)
+    flat = line.points[segment] + t[:, None] * (line.points[segment + 1] - line.points[segment])
+    points, normals = surface.at(flat, line.face[segment])
+    return Stroke(points, normals, at - at[0], path, path_normals, line.level, line.closed)
+
+
+def _lifted(line: Line, surface: SmoothSurface) -> tuple[Array, Array]:
+    face = np.concatenate([line.face, line.face[-1:]])
+    return surface.at(line.points, face)
+
+
+def _stations(length: float, step: float, *, closed: bool) -> Array:
+    if closed:
+        n = max(3, round(length / step))
+        return np.asarray(np.arange(n) * (length / n))
+    n = max(1, round(length / step))
+    over = length - n * step * (1 + SPACING_OF_STEP)
+    trim = float(np.clip(over / 2, 0.0, TRIM_OF_STEP * step))
+    return np.linspace(trim, length - trim, n + 1)
