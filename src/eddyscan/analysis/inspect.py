@@ -1,0 +1,173 @@
+"""From the record of a scan to signals on the surface and indications."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from eddyscan.analysis.background import explained, robust_sigma, slow_along_rows
+from eddyscan.analysis.detection import blob_score
+from eddyscan.analysis.edges import distance_to_rim_mm, edge_zone_mm
+from eddyscan.analysis.geometry import Footing, footing
+from eddyscan.analysis.indications import Signals, find_indications
+from eddyscan.analysis.mapping import map_to_surface
+from eddyscan.analysis.readings import Readings, usable
+from eddyscan.analysis.response import Projection, SoundResponse, sound_response, technique_coil, technique_conductor
+from eddyscan.analysis.result import AnalysisResult
+from eddyscan.core.frames import Array, BoolArray
+from eddyscan.core.mesh import SurfaceMesh
+from eddyscan.core.progress import Progress, silent
+from eddyscan.core.record import ScanRecord
+from eddyscan.core.technique import Technique
+
+SLOW_WINDOW_IN_DIAMETERS = 8.0
+FOOTPRINT_IN_MEAN_RADII = 0.6
+CURVATURE_RADIUS_SQUARED_IN_OUTER = 0.76
+
+
+def analyse(
+    record: ScanRecord, mesh: SurfaceMesh, technique: Technique, *, progress: Progress = silent
+) -> AnalysisResult:
+    """Turn a record into lift-off, residual, C-scan and indications.
+
+    Parameters
+    ----------
+    record : ScanRecord
+        Raw readings; never changed. `meta` needs `T_stage_part` and should hold `air`.
+    mesh : SurfaceMesh [mm, part]
+    technique : Technique
+    progress : Progress
+
+    Returns
+    -------
+    AnalysisResult
+        Channels of its C-scan: "lift_off_mm" (coil to surface), "amplitude_ohm" (change
+        against air), "residual_ohm" (size of what sound metal does not explain),
+        "score" (matched residual over its noise).
+
+    Raises
+    ------
+    InputError
+        Empty record, too few unflagged readings, another frequency.
+    GeometryError
+        The readings lie nowhere near the surface.
+    """
+    progress("readings", 0, 4)
+    readings = usable(record, technique.drive.frequency_hz)
+    below = footing(mesh, readings.part_mm, axis=probe_axis(readings, technique))
+    progress("lift-off", 1, 4)
+    response = response_for(technique, readings.air_ohm, largest_tilt_deg=float(below.tilt_deg.max()))
+    projection = response.project(readings.impedance_ohm, below.tilt_deg)
+    lift_off = projection.lift_off_mm - curvature_gap_mm(technique, below.curvature_per_mm)
+    progress("residual", 2, 4)
+    across = crack_channel(readings, below, projection, technique)
+    signals = _signals(readings, below, projection, across, technique, mesh)
+    progress("indications", 3, 4)
+    found = find_indications(
+        signals, threshold=technique.analysis.threshold_mad, merge_mm=2 * technique.probe.outer_radius_mm
+    )
+    amplitude = np.abs(readings.impedance_ohm - response.air_ohm)
+    cscan = _cscan(mesh, below, {"lift_off_mm": lift_off, "amplitude_ohm": amplitude}, signals, technique)
+    statistics = _statistics(record, readings, lift_off, signals, cscan.covered, response)
+    progress("indications", 4, 4)
+    n = len(record)
+    return AnalysisResult(
+        cscan,
+        found,
+        _spread(lift_off, readings, n),
+        _spread(signals.residual_ohm, readings, n),
+        statistics,
+        _spread(below.foot_mm, readings, n),
+        _spread(signals.score, readings, n),
+    )
+
+
+def probe_axis(readings: Readings, technique: Technique) -> Array | None:
+    """Return the probe's fixed direction, or None when the machine keeps it on the normal."""
+    return readings.axis if technique.plan.machine == "xyz" else None
+
+
+def response_for(technique: Technique, air_ohm: complex | None, *, largest_tilt_deg: float) -> SoundResponse:
+    """Return the sound part's curve for a technique and the coil's air reading [ohm]."""
+    return sound_response(
+        technique_coil(technique),
+        technique_conductor(technique),
+        technique.drive.frequency_hz,
+        air_ohm=air_ohm,
+        largest_lift_off_mm=2.0 * technique.analysis.lift_off_max_mm + 1.0,
+        largest_tilt_deg=largest_tilt_deg,
+    )
+
+
+def curvature_gap_mm(technique: Technique, curvature_per_mm: Array) -> Array:
+    """Return the extra lift-off a curved surface seems to have (M,) [mm].
+
+    r_eff^2 / 4 times the sum of the principal curvatures, convex positive, with
+    r_eff = 0.87 outer radii: first-order gap, checked against the series solution
+    for a conducting sphere.
+    """
+    r_squared = CURVATURE_RADIUS_SQUARED_IN_OUTER * technique.probe.outer_radius_mm**2
+    return np.asarray(0.25 * r_squared * curvature_per_mm)
+
+
+def crack_channel(readings: Readings, below: Footing, projection: Projection, technique: Technique) -> Array:
+    """Return the signed residual across the lift-off curve, slow changes taken out (M,) [ohm]."""
+    across = projection.across_ohm
+    h, tilt = projection.lift_off_mm, np.radians(below.tilt_deg)
+    causes = np.column_stack([h, h**2, h**3, tilt, tilt**2, below.curvature_per_mm, readings.time_s])
+    left = across - explained(across, causes)
+    window = SLOW_WINDOW_IN_DIAMETERS * 2 * technique.probe.outer_radius_mm
+    return np.asarray(left - slow_along_rows(left, readings.row, readings.part_mm, window_mm=window))
+
+
+def _signals(
+    readings: Readings, below: Footing, projection: Projection, across: Array, technique: Technique, mesh: SurfaceMesh
+) -> Signals:
+    probe = technique.probe
+    falling = -projection.tangent_ohm_mm / np.abs(projection.tangent_ohm_mm)
+    width = FOOTPRINT_IN_MEAN_RADII * (probe.inner_radius_mm + probe.outer_radius_mm) / 2
+    score = blob_score(across, below.foot_mm, width_mm=width)
+    near = np.nan_to_num(projection.lift_off_mm, nan=np.inf) <= technique.analysis.lift_off_max_mm
+    inside = distance_to_rim_mm(mesh, below.foot_mm) > edge_zone_mm(probe.outer_radius_mm)
+    return Signals(
+        below.foot_mm, below.normal, readings.row, 1j * across * falling, score, near & inside, robust_sigma(across)
+    )
+
+
+def _cscan(
+    mesh: SurfaceMesh, below: Footing, channels: dict[str, Array], signals: Signals, technique: Technique
+) -> Any:
+    reach = 0.55 * float(np.hypot(technique.plan.pitch_mm, technique.plan.step_mm))
+    values = {**channels, "residual_ohm": signals.residual_ohm, "score": signals.score}
+    reach = max(reach, technique.probe.outer_radius_mm)
+    return map_to_surface(mesh, below.foot_mm, values, reach_mm=reach, speaks=signals.callable)
+
+
+def _statistics(
+    record: ScanRecord,
+    readings: Readings,
+    lift_off: Array,
+    signals: Signals,
+    covered: BoolArray,
+    response: SoundResponse,
+) -> dict[str, Any]:
+    known = lift_off[np.isfinite(lift_off)]
+    spread = {f"p{p:02d}": float(np.percentile(known, p)) if known.size else None for p in (5, 50, 95)}
+    return {
+        "readings": len(record),
+        "readings_used": len(readings),
+        "readings_flagged": int((record.flag != 0).sum()),
+        "readings_too_far": int(np.isnan(lift_off).sum()),
+        "lift_off_mm": {"mean": float(known.mean()) if known.size else None, **spread},
+        "residual_noise_ohm": signals.noise_ohm,
+        "residual_noise_share_of_x0": signals.noise_ohm / abs(response.air_ohm.imag),
+        "reactance_air_ohm": float(response.air_ohm.imag),
+        "covered_share": float(covered.mean()),
+    }
+
+
+def _spread(values: Any, readings: Readings, n: int) -> Any:
+    full = np.full((n, *values.shape[1:]), np.nan, dtype=values.dtype)
+    full[readings.index] = values
+    return full
