@@ -1,0 +1,6 @@
+"""The report: one self-contained page, and the same on paper."""
+
+from eddyscan.report.content import NominalComparison, ReportContent
+from eddyscan.report.html import render_html
+
+__all__ = ["NominalComparison", "ReportContent", "render_html"]

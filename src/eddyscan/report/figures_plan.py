@@ -1,0 +1,101 @@
+"""The plan: its rows over the part, predicted lift-off and tilt, and what is left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from eddyscan.core.mesh import SurfaceMesh
+from eddyscan.core.plan import ScanPlan
+from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def path_figure(plan: ScanPlan, mesh: SurfaceMesh | None, theme: Theme) -> Figure:
+    """Draw the path from above: rows, links, start and end, and the uncovered spots."""
+    figure, axes = canvas(height_in=3.9)
+    if mesh is not None:
+        axes.tripcolor(
+            mesh.vertices[:, 0],
+            mesh.vertices[:, 1],
+            mesh.faces,
+            mesh.vertices[:, 2],
+            cmap="Greys_r",
+            alpha=0.25,
+            shading="gouraud",
+            rasterized=True,
+        )
+    spots = plan.surface_mm
+    scan = plan.is_scan
+    axes.plot(
+        spots[:, 0],
+        spots[:, 1],
+        color=theme.muted,
+        lw=0.5,
+        ls=":",
+        label="links and approaches",
+        rasterized=len(plan) > 5000,
+    )
+    drawn = axes.scatter(
+        spots[scan, 0],
+        spots[scan, 1],
+        c=np.arange(plan.n_scan),
+        s=point_size(plan.n_scan),
+        cmap="viridis",
+        label=f"{plan.n_scan} readings in {plan.n_rows} rows",
+        rasterized=plan.n_scan > 2000,
+        lw=0,
+    )
+    first, last = spots[scan][0], spots[scan][-1]
+    axes.annotate("start", first[:2], (-6, 5), textcoords="offset points", color=theme.ink, fontsize=8.5, ha="right")
+    axes.annotate("end", last[:2], (6, 5), textcoords="offset points", color=theme.ink, fontsize=8.5)
+    _mark_uncovered(axes, plan, theme)
+    colour_bar(figure, drawn, axes, "visiting order", theme)
+    map_axes(axes, "The path from above")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+    return figure
+
+
+def _mark_uncovered(axes: Axes, plan: ScanPlan, theme: Theme) -> None:
+    spots = [spot for spot in plan.coverage.uncovered if spot.centre_mm is not None]
+    for number, spot in enumerate(spots):
+        assert spot.centre_mm is not None
+        axes.plot(
+            *spot.centre_mm[:2],
+            marker="x",
+            color=theme.alarm,
+            ms=7,
+            mew=1.6,
+            ls="none",
+            label="left out" if number == 0 else "_",
+        )
+
+
+def point_size(points: int) -> float:
+    """Return a marker area that fills a map of `points` readings without hiding the rows."""
+    return float(np.clip(9000 / max(points, 1), 1.5, 14))
+
+
+def predicted_figure(plan: ScanPlan, target_mm: float, theme: Theme) -> Figure:
+    """Draw predicted lift-off and tilt of every reading in visiting order."""
+    figure, (lift, tilt) = canvas(height_in=3.9, rows=2, sharex=True)
+    scan = plan.is_scan
+    order = np.arange(plan.n_scan)
+    for axes in (lift, tilt):
+        for k in np.flatnonzero(np.diff(plan.row[scan])):
+            axes.axvline(k + 0.5, color=theme.rule, lw=0.5, zorder=0)
+        axes.grid(axis="x", visible=False)
+    lift.plot(order, plan.lift_off_mm[scan], color=theme.second, lw=1)
+    lift.axhline(target_mm, color=theme.accent, lw=1, ls="--", label=f"asked for: {target_mm:g} mm")
+    lift.set_ylabel("lift-off [mm]")
+    lift.set_title("Predicted lift-off and tilt of every reading (vertical lines part the rows)")
+    lift.legend(loc="upper right")
+    tilt.plot(order, plan.tilt_deg[scan], color=theme.second, lw=1)
+    tilt.set_ylabel("tilt [°]")
+    tilt.set_xlabel("reading, in visiting order")
+    tilt.set_ylim(bottom=0)
+    return figure

@@ -1,0 +1,94 @@
+"""Where the stage was asked to go and where it says it was: the reference study's figures 20 and 21."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from eddyscan.core.record import ScanRecord
+from eddyscan.report.theme import Theme, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class AxisError:
+    """Recorded minus planned position of one axis [um]."""
+
+    axis: str
+    mean_um: float
+    std_um: float
+    largest_um: float
+    readings: int
+
+
+def axis_errors(record: ScanRecord) -> tuple[AxisError, ...]:
+    """Return mean, standard deviation and largest error per axis over the readings that have a position."""
+    errors = []
+    for k, axis in enumerate(AXES):
+        error = 1000 * (record.stage_mm[:, k] - record.target_mm[:, k])
+        error = error[np.isfinite(error)]
+        if error.size:
+            errors.append(
+                AxisError(axis, float(error.mean()), float(error.std()), float(np.abs(error).max()), error.size)
+            )
+    return tuple(errors)
+
+
+def longest_row(record: ScanRecord) -> int:
+    """Return the row with the most readings."""
+    rows, counts = np.unique(record.row, return_counts=True)
+    return int(rows[counts.argmax()])
+
+
+def position_figure(record: ScanRecord, theme: Theme) -> Figure:
+    """Draw planned and recorded positions of one row in x and z, and of the whole scan in x and y."""
+    figure, (side, above) = canvas(height_in=3.0, columns=2)
+    row = longest_row(record)
+    one = record.row == row
+    for axes, chosen, (i, j) in ((side, one, (0, 2)), (above, np.ones(len(record), bool), (0, 1))):
+        heavy = int(chosen.sum()) > 2000
+        axes.plot(
+            record.target_mm[chosen, i],
+            record.target_mm[chosen, j],
+            "o",
+            mfc="none",
+            mec=theme.accent,
+            ms=4.5,
+            mew=0.9,
+            label="planned",
+            rasterized=heavy,
+        )
+        axes.plot(
+            record.stage_mm[chosen, i],
+            record.stage_mm[chosen, j],
+            ".",
+            color=theme.second,
+            ms=2.6,
+            label="recorded",
+            rasterized=heavy,
+        )
+        axes.set_xlabel(f"{AXES[i]} stage [mm]")
+        axes.set_ylabel(f"{AXES[j]} stage [mm]")
+    side.set_title(f"Row {row}: x and z")
+    above.set_title("Whole scan: x and y")
+    side.legend(loc="best")
+    return figure
+
+
+def error_figure(record: ScanRecord, theme: Theme) -> Figure:
+    """Draw how the position errors of each axis are spread."""
+    figure, axes = canvas(height_in=2.3, columns=3)
+    for panel, error in zip(axes, axis_errors(record), strict=False):
+        values = 1000 * (record.stage_mm - record.target_mm)[:, AXES.index(error.axis)]
+        panel.hist(values[np.isfinite(values)], bins=40, color=theme.accent, lw=0)
+        panel.axvline(error.mean_um, color=theme.second, lw=1.2)
+        panel.set_title(f"{error.axis}: {error.mean_um:+.2f} ± {error.std_um:.2f} µm")
+        panel.set_xlabel("recorded − planned [µm]")
+    axes[0].set_ylabel("readings")
+    return figure

@@ -1,0 +1,132 @@
+"""The surface against its nominal: the profile of the reference study's figure 12, and the map of deviations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from eddyscan.core.frames import Array, apply
+from eddyscan.core.mesh import SurfaceMesh
+from eddyscan.report.content import NominalComparison
+from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BINS = 100
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Heights along x, averaged over y: (K,) arrays in mm; NaN where a strip holds no vertex."""
+
+    x_mm: Array
+    measured_mm: Array
+    spread_mm: Array
+    nominal_mm: Array
+
+
+def profile(mesh: SurfaceMesh, nominal: NominalComparison | None) -> Profile:
+    """Average z in strips along x, measured and nominal at the very same spots."""
+    points = mesh.vertices if nominal is None else apply(nominal.T_nominal_mesh, mesh.vertices)
+    expected = np.full(len(points), np.nan) if nominal is None else heights(nominal.surface, points[:, :2])
+    if nominal is not None:
+        points, expected = points[np.isfinite(expected)], expected[np.isfinite(expected)]
+    if len(points) == 0:
+        return Profile(*(np.array([np.nan]) for _ in range(4)))
+    edges = np.linspace(points[:, 0].min(), points[:, 0].max() + 1e-9, BINS + 1)
+    strip = np.clip(np.digitize(points[:, 0], edges) - 1, 0, BINS - 1)
+    count = np.bincount(strip, minlength=BINS)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.bincount(strip, points[:, 2], BINS) / count
+        square = np.bincount(strip, (points[:, 2] - mean[strip]) ** 2, BINS) / count
+        expected_mean = np.bincount(strip, expected, BINS) / count
+    return Profile((edges[:-1] + edges[1:]) / 2, mean, np.sqrt(square), expected_mean)
+
+
+def heights(surface: SurfaceMesh, xy_mm: Array) -> Array:
+    """Return the upper height of a mesh at (N, 2) spots [mm]; NaN beside it."""
+    from scipy.interpolate import LinearNDInterpolator
+
+    upward = surface.vertices[surface.normals[:, 2] > 0.02]
+    if len(upward) < 4:
+        return np.full(len(xy_mm), np.nan)
+    return np.asarray(LinearNDInterpolator(upward[:, :2], upward[:, 2])(xy_mm), dtype=np.float64)
+
+
+def profile_figure(mesh: SurfaceMesh, nominal: NominalComparison | None, theme: Theme) -> Figure:
+    """Draw z along x, averaged over y, and below it the difference to the nominal."""
+    line = profile(mesh, nominal)
+    rows = 1 if nominal is None else 2
+    ratios = None if nominal is None else [2, 1]
+    figure, axes = canvas(height_in=1.6 + 1.5 * rows, rows=rows, sharex=True, height_ratios=ratios, squeeze=False)
+    top = axes[0, 0]
+    top.fill_between(
+        line.x_mm,
+        line.measured_mm - line.spread_mm,
+        line.measured_mm + line.spread_mm,
+        color=theme.second,
+        alpha=0.18,
+        lw=0,
+    )
+    if nominal is not None:
+        top.plot(line.x_mm, line.nominal_mm, color=theme.accent, lw=2.2, label=f"nominal {nominal.name}")
+    top.plot(line.x_mm, line.measured_mm, color=theme.second, lw=1.1, label="measured, mean over y (band: ± 1 std)")
+    top.set_ylabel("z [mm]")
+    top.set_title("Height along x")
+    top.legend(loc="best")
+    if nominal is not None:
+        below = axes[1, 0]
+        below.axhline(0, color=theme.accent, lw=1.2)
+        below.plot(line.x_mm, 1000 * (line.measured_mm - line.nominal_mm), color=theme.second, lw=1.2)
+        below.set_ylabel("difference [µm]")
+    axes[-1, 0].set_xlabel("x [mm]")
+    return figure
+
+
+def deviation_figure(mesh: SurfaceMesh, signed_mm: Array, theme: Theme) -> Figure:
+    """Draw the signed distance to the nominal over the part, and how it is spread."""
+    figure, (plan, spread) = canvas(height_in=3.1, columns=2, width_ratios=[2.4, 1])
+    known = np.isfinite(signed_mm)
+    limit = max(float(np.percentile(np.abs(signed_mm[known]), 99)), 1e-6) if known.any() else 1.0
+    faces = mesh.faces[known[mesh.faces].all(axis=1)]
+    if len(faces):
+        drawn = plan.tripcolor(
+            mesh.vertices[:, 0],
+            mesh.vertices[:, 1],
+            faces,
+            np.where(known, 1000 * signed_mm, 0.0),
+            cmap="RdBu_r",
+            vmin=-1000 * limit,
+            vmax=1000 * limit,
+            shading="gouraud",
+            rasterized=True,
+        )
+        colour_bar(figure, drawn, plan, "outside + / inside − [µm]", theme)
+    map_axes(plan, "Distance to the nominal along the normal")
+    spread.hist(1000 * np.clip(signed_mm[known], -limit, limit), bins=60, color=theme.accent, lw=0)
+    spread.axvline(0, color=theme.second, lw=1)
+    spread.set_title("Distribution")
+    spread.set_xlabel("distance [µm]")
+    spread.set_ylabel("vertices")
+    return figure
+
+
+def uncertainty_figure(mesh: SurfaceMesh, theme: Theme) -> Figure:
+    """Draw the stated standard uncertainty of the surface over the part."""
+    assert mesh.uncertainty_mm is not None
+    figure, plan = canvas(height_in=3.1)
+    drawn = plan.tripcolor(
+        mesh.vertices[:, 0],
+        mesh.vertices[:, 1],
+        mesh.faces,
+        1000 * mesh.uncertainty_mm,
+        cmap="cividis",
+        shading="gouraud",
+        rasterized=True,
+    )
+    colour_bar(figure, drawn, plan, "standard uncertainty [µm]", theme)
+    map_axes(plan, "Stated uncertainty of the surface, along its normal")
+    return figure

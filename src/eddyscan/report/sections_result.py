@@ -1,0 +1,140 @@
+"""Chapters about the signal: reference checks, maps, coverage as examined, indications."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from eddyscan.core.indication import Indication
+from eddyscan.core.plan import Uncovered
+from eddyscan.report.blocks import Block, Chart, Note, Section, Table
+from eddyscan.report.content import ReportContent
+from eddyscan.report.figures_coverage import coverage_figure, examined_share
+from eddyscan.report.figures_indication import indication_figure
+from eddyscan.report.figures_signal import (
+    cscan_figure,
+    lift_off_figure,
+    plane_figure,
+    reading_maps,
+    readings_figure,
+    strip_figure,
+)
+from eddyscan.report.tables import as_entries, facts_of, table_of
+from eddyscan.report.words import MISSING, number, percent, plus_minus
+
+NO_SCAN = Note("Nothing was scanned.", "missing")
+
+
+def references(content: ReportContent) -> Section:
+    """Show the responses of the reference block before and after the scan."""
+    entries = [] if content.record is None else as_entries(content.record.meta.get("references"))
+    if not entries:
+        text = "No reference check is recorded, so amplitudes are not related to a reference notch."
+        return Section("references", "Reference checks", "", (Note(text, "missing"),))
+    return Section("references", "Reference checks", "", (table_of(entries, "Responses of the reference block"),))
+
+
+def signals(content: ReportContent) -> Section:
+    """Show the raw signals and the mapped channels."""
+    record = content.record
+    if record is None or len(record) == 0:
+        return Section("signals", "Signals", "", (NO_SCAN,))
+    maps = reading_maps(record, content.residual_ohm, content.lift_off_mm)
+    flagged = int((record.flag != 0).sum())
+    lead = f"{len(record)} readings at {number(float(np.median(record.frequency_hz)) / 1000)} kHz, {flagged} flagged."
+    blocks: list[Block] = [Chart(partial(readings_figure, record, maps), "Every reading where it was taken.")]
+    if content.cscan is not None and content.cscan.channels:
+        names = list(content.cscan.channels)
+        blocks.append(Chart(partial(cscan_figure, content.cscan, names), "C-scan on the surface, seen from above."))
+    if content.lift_off_mm is not None and np.isfinite(content.lift_off_mm).any():
+        target = content.technique.scan.lift_off_mm
+        blocks.append(Chart(partial(lift_off_figure, content.lift_off_mm, target), "Actual lift-off.", half=True))
+    blocks.append(Chart(partial(plane_figure, record, content.lift_off_mm), "Raw impedance, unrotated.", half=True))
+    blocks.append(Chart(partial(strip_figure, record, content.residual_ohm), "Raw signals over time."))
+    if content.statistics:
+        blocks.append(facts_of(content.statistics, "Statistics of the analysis"))
+    return Section("signals", "Signals and maps", lead, tuple(blocks))
+
+
+def coverage(content: ReportContent) -> Section:
+    """Show what was examined, and list what was not and why."""
+    blocks: list[Block] = []
+    if content.cscan is not None:
+        share = examined_share(content.cscan)
+        limit = content.technique.analysis.lift_off_max_mm
+        text = f"A reading within {limit:g} mm lift-off speaks for {percent(share)} of the whole surface."
+        blocks.append(Chart(partial(coverage_figure, content.cscan), text))
+    else:
+        blocks.append(Note("No C-scan, so nothing can be called examined.", "missing"))
+    planned = () if content.plan is None else content.plan.coverage.uncovered
+    left_out = [("planning", spot) for spot in planned] + [("examination", spot) for spot in content.not_examined]
+    if left_out:
+        blocks.append(_uncovered_table(left_out))
+    elif content.plan is not None:
+        blocks.append(Note("The plan leaves out nothing inside the margin.", "good"))
+    margin = content.technique.plan.margin_mm
+    blocks.append(Note(f"A rim of {margin:g} mm along the edge is outside the region by the technique.", "plain"))
+    return Section("coverage", "Examined, and what was not covered", "", tuple(blocks))
+
+
+def _uncovered_table(left_out: Sequence[tuple[str, Uncovered]]) -> Table:
+    rows = []
+    for found_in, spot in sorted(left_out, key=lambda entry: -entry[1].area_mm2):
+        centre = MISSING if spot.centre_mm is None else ", ".join(f"{v:.1f}" for v in spot.centre_mm)
+        rows.append((spot.reason, f"{spot.area_mm2:.1f}", centre, found_in))
+    columns = ("reason", "area [mm²]", "centre x, y, z [mm]", "found in")
+    return Table(columns, tuple(rows), "Not covered, and why", frozenset({0, 3}))
+
+
+def indications(content: ReportContent) -> Section:
+    """List every indication, then show each by itself."""
+    title = "Indications"
+    if content.indications is None:
+        return Section("indications", title, "", (Note("The signals were not analysed for indications.", "missing"),))
+    level = content.technique.analysis.threshold_mad
+    lead = f"Called where the residual exceeds {level:g} robust standard deviations of itself over the part."
+    if not content.indications:
+        return Section("indications", title, lead, (Note("No indication in the examined area.", "good"),))
+    blocks: list[Block] = [indication_table(content.indications)]
+    if content.record is not None and len(content.record):
+        for one in content.indications:
+            x, y, z = one.centre_mm
+            caption = f"Indication {one.number} at x {x:.1f}, y {y:.1f}, z {z:.1f} mm."
+            blocks.append(Chart(partial(indication_figure, content, one), caption))
+    return Section("indications", title, lead, tuple(blocks))
+
+
+def indication_table(found: Sequence[Indication]) -> Table:
+    """Return the table an auditor expects, one line per indication."""
+    rows = tuple(
+        (
+            str(one.number),
+            *(f"{v:.1f}" for v in one.centre_mm),
+            f"{one.extent_mm:.1f}",
+            f"{one.angle_deg:.0f}",
+            number(1000 * one.amplitude_ohm),
+            f"{one.phase_deg:.0f}",
+            f"{one.snr:.1f}",
+            plus_minus(one.length_mm, one.length_uncertainty_mm),
+            plus_minus(one.depth_mm, one.depth_uncertainty_mm),
+            one.classification,
+        )
+        for one in found
+    )
+    columns = (
+        "no.",
+        "x [mm]",
+        "y [mm]",
+        "z [mm]",
+        "extent [mm]",
+        "angle [°]",
+        "amplitude [mΩ]",
+        "phase [°]",
+        "SNR",
+        "length [mm]",
+        "depth [mm]",
+        "class",
+    )
+    return Table(columns, rows, "Indications, part frame", frozenset({11}))
