@@ -1,0 +1,145 @@
+"""The virtual cell: the truth, and the three devices that see it.
+
+A depth camera ray-casts the part on its table; a Zaber controller moves the
+probe; an LCR meter reads the coil. The software under test gets images,
+positions and impedances through the devices' own wires and never the truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from eddyscan.core.frames import Array
+from eddyscan.core.mesh import SurfaceMesh
+from eddyscan.core.parts import named_part
+from eddyscan.devices.protocols import Clock
+from eddyscan.devices.sim.camera import VirtualDepthCamera
+from eddyscan.devices.sim.flaws import flaws_of
+from eddyscan.devices.sim.lcr import LcrSimulator
+from eddyscan.devices.sim.truth import CellTruth
+from eddyscan.devices.sim.world_foot import FootFinder
+from eddyscan.devices.sim.world_placement import hidden_pose, operators_pose, surface_pose
+from eddyscan.devices.sim.world_probe import ProbeOverPart, StagePosition, TrueReading
+from eddyscan.devices.sim.world_scene import build_scene
+from eddyscan.devices.sim.world_settings import WorldSettings
+from eddyscan.devices.sim.zaber import ZaberSimulator
+from eddyscan.devices.sim.zaber_settings import ZaberSettings
+
+__all__ = ["CellAddresses", "VirtualCell", "WorldSettings"]
+
+
+@dataclass(frozen=True)
+class CellAddresses:
+    """Where the cell's devices listen: what a real rig.toml would name."""
+
+    stage: str
+    instrument: str
+
+
+class CoilAtStage:
+    """The coil as the meter's terminals know it: follows the stage's true position."""
+
+    def __init__(self, probe: ProbeOverPart, position: StagePosition, clock: Clock) -> None:
+        self._probe, self._position, self._clock = probe, position, clock
+        self._waiting: TrueReading | None = None
+
+    def read(self, frequency_hz: float, aperture_s: float) -> complex:
+        """Return the impedance [ohm] at the stage's true position now."""
+        now = self._clock.now()
+        z, self._waiting = self._probe.feel(self._position(), frequency_hz, now)
+        return self._probe.noise.apply(z, self._probe.air_ohm(frequency_hz), now, aperture_s)
+
+    def sent(self, impedance_ohm: complex) -> None:
+        """File the truth under the numbers that went over the wire."""
+        if self._waiting is not None:
+            self._probe.remember(impedance_ohm, self._waiting)
+
+
+class VirtualCell:
+    """One part on a table and on a stage, with its hidden pose and flaws.
+
+    Parameters
+    ----------
+    settings : WorldSettings
+    clock : Clock
+        Stage and instrument run in this clock's time.
+    """
+
+    def __init__(self, settings: WorldSettings, clock: Clock) -> None:
+        self.settings, self.clock = settings, clock
+        self._part = named_part(settings.part)
+        finder = FootFinder(self._part)
+        flaws = flaws_of(settings, self._part, finder)
+        self._T_stage_part = hidden_pose(self._part, settings.placement, settings.seed)
+        self._probe = ProbeOverPart(settings, self._part, self._T_stage_part, flaws, finder)
+        self._truth = CellTruth(self._part, self._T_stage_part, flaws, self._probe)
+        self._addresses: CellAddresses | None = None
+        self._camera: VirtualDepthCamera | None = None
+
+    @cached_property
+    def stage(self) -> ZaberSimulator:
+        """The simulated controller: faults are injected here."""
+        s = self.settings.stage
+        options = ZaberSettings(
+            layout=s.layout, firmware=s.firmware, reply_delay_s=s.reply_delay_s, seed=self.settings.seed
+        )
+        return ZaberSimulator(options, self.clock)
+
+    @cached_property
+    def instrument(self) -> LcrSimulator:
+        """The simulated meter."""
+        o = self.settings.instrument
+        return LcrSimulator(
+            CoilAtStage(self._probe, self.stage.true_position, self.clock),
+            self.clock,
+            short_s=o.short_s,
+            latency_s=o.latency_s,
+            digits=o.digits,
+            overload_ohm=o.overload_ohm,
+            faults=self.settings.faults,
+        )
+
+    def camera(self) -> VirtualDepthCamera:
+        """Return the depth camera over the table, where the part lies in a pose of its own."""
+        if self._camera is None:
+            s = self.settings
+            scene = build_scene(s.part, seed=s.seed, clutter=s.clutter, edge_mm=s.mesh_edge_mm)
+            self._camera = VirtualDepthCamera(scene, s.camera, s.seed)
+        return self._camera
+
+    def start(self) -> CellAddresses:
+        """Start the stage controller and the meter on loopback ports; again: the same addresses."""
+        if self._addresses is None:
+            host, port = self.stage.start()
+            meter_host, meter_port = self.instrument.start()
+            self._addresses = CellAddresses(f"tcp://{host}:{port}", f"TCPIP::{meter_host}::{meter_port}::SOCKET")
+        return self._addresses
+
+    def rough_alignment(self, surface: SurfaceMesh | None = None) -> Array:
+        """Return T_stage_part as an operator finds it, with the error that [world.placement] names.
+
+        Parameters
+        ----------
+        surface : SurfaceMesh or None
+            The surface the operator looks at. Its ends may be exchanged against
+            the part's drawing; the operator jogs to the corner that the picture
+            shows as origin.
+        """
+        believed = operators_pose(self._T_stage_part, self.settings.placement, self.settings.seed)
+        return np.asarray(believed @ surface_pose(self._part, surface))
+
+    def truth(self) -> CellTruth:
+        """Return the judge: for summary.json, benchmarks and tests, never for a step of the line."""
+        return self._truth
+
+    def close(self) -> None:
+        """Stop the devices."""
+        if self._addresses is not None:
+            self.instrument.close()
+            self.stage.close()
+            self._addresses = None
+        if self._camera is not None:
+            self._camera.close()

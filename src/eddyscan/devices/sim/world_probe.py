@@ -1,0 +1,116 @@
+"""What happens at the coil: true pose over the true part, felt as an impedance and remembered as truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from eddyscan.core.frames import Array, apply, invert
+from eddyscan.core.parts import NominalPart
+from eddyscan.devices.sim.flaws import Flaw
+from eddyscan.devices.sim.instrument_physics import CoilResponse, curvature_gap_mm, edge_zone_mm, real_coil
+from eddyscan.devices.sim.instrument_physics_noise import ReadingNoise
+from eddyscan.devices.sim.world_foot import FootFinder
+from eddyscan.devices.sim.world_placement import knocked
+from eddyscan.devices.sim.world_settings import WorldSettings
+from eddyscan.physics import Conductor
+
+StagePosition = Callable[[], Array]
+
+
+@dataclass(frozen=True)
+class TrueReading:
+    """What really was, when the instrument read.
+
+    Attributes
+    ----------
+    time_s : the cell's clock
+    stage_mm : (3,) true coil position [mm, stage]
+    part_mm : (3,) the same [mm, part]
+    foot_mm : (3,) spot below it [mm, part]
+    lift_off_mm : float, along the surface normal; negative: the tip is pressed into the part
+    tilt_deg : probe axis against the surface normal
+    edge_mm : distance of the spot to the outline, negative beyond it
+    near_edge : whether the reading is within the zone that has no physics
+    curvature_per_mm : sum of the principal curvatures at the spot
+    """
+
+    time_s: float
+    stage_mm: Array
+    part_mm: Array
+    foot_mm: Array
+    lift_off_mm: float
+    tilt_deg: float
+    edge_mm: float
+    near_edge: bool
+    curvature_per_mm: float
+
+
+class ProbeOverPart:
+    """The coil on the true part, at the place where the stage really is."""
+
+    def __init__(
+        self,
+        settings: WorldSettings,
+        part: NominalPart,
+        T_stage_part: Array,
+        flaws: tuple[Flaw, ...],
+        finder: FootFinder,
+    ) -> None:
+        self._settings, self._part, self._flaws, self._finder = settings, part, flaws, finder
+        self._T_part_stage = invert(T_stage_part)
+        self._T_knocked = invert(knocked(T_stage_part, settings.faults.part_shift_mm))
+        lean = settings.placement.probe_tilt_deg * np.random.default_rng([settings.seed, 10]).uniform(-1, 1, 2)
+        self._axis_stage = Rotation.from_euler("xy", lean, degrees=True).apply([0.0, 0.0, -1.0])
+        self.coil = real_coil(settings.coil, settings.instrument.coil_tolerance, settings.seed)
+        self.conductor = Conductor.half_space(settings.conductivity_ms_m)
+        self.noise = ReadingNoise(settings.instrument, settings.seed)
+        self.log: dict[tuple[str, str], list[TrueReading]] = {}
+        self.history: list[TrueReading] = []
+        self.count = 0
+        self._responses: dict[float, CoilResponse] = {}
+
+    def pose(self, stage_mm: Array, time_s: float) -> TrueReading:
+        """Return the truth for a coil position (3,) [mm, stage]."""
+        shift_after = self._settings.faults.part_shift_after
+        T = self._T_knocked if shift_after and self.count >= shift_after else self._T_part_stage
+        at = apply(T, stage_mm[None, :3])[0]
+        foot = self._finder.at(at)
+        axis = T[:3, :3] @ self._axis_stage
+        tilt = float(np.degrees(np.arccos(np.clip(-axis @ foot.normal, -1.0, 1.0))))
+        near = foot.edge_mm < edge_zone_mm(self.coil)
+        return TrueReading(
+            time_s, stage_mm[:3], at, foot.point_mm, foot.distance_mm, tilt, foot.edge_mm, near, foot.curvature_per_mm
+        )
+
+    def feel(self, stage_mm: Array, frequency_hz: float, time_s: float) -> tuple[complex, TrueReading]:
+        """Return the coil's own impedance [ohm] at a place, and the truth behind it."""
+        truth = self.pose(stage_mm, time_s)
+        response = self._response(frequency_hz)
+        gap = max(truth.lift_off_mm, 0.0)
+        if truth.edge_mm > 0:
+            gap = max(gap + curvature_gap_mm(self.coil, gap, truth.curvature_per_mm), 0.0)
+        return response.impedance_ohm(gap, truth.tilt_deg), truth
+
+    def air_ohm(self, frequency_hz: float) -> complex:
+        """Return j omega L0 of the real coil [ohm]."""
+        return self._response(frequency_hz).air_ohm
+
+    def remember(self, as_read_ohm: complex, truth: TrueReading) -> None:
+        """File the truth under the impedance that the wire carried, which is all the software will know."""
+        self.log.setdefault(reading_key(as_read_ohm), []).append(truth)
+        self.history.append(truth)
+        self.count += 1
+
+    def _response(self, frequency_hz: float) -> CoilResponse:
+        if frequency_hz not in self._responses:
+            self._responses[frequency_hz] = CoilResponse(self.coil, self.conductor, frequency_hz)
+        return self._responses[frequency_hz]
+
+
+def reading_key(impedance_ohm: complex) -> tuple[str, str]:
+    """Return what tells one reading from another: both parts to nine digits, the noise makes them unique."""
+    return f"{impedance_ohm.real:.8e}", f"{impedance_ohm.imag:.8e}"
