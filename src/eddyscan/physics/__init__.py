@@ -8,15 +8,22 @@ from eddyscan.physics.coil import Coil, air_inductance_h
 from eddyscan.physics.conductor import Conductor, Layer, skin_depth_mm
 from eddyscan.physics.impedance import impedance_change_ohm, impedance_ohm, least_lift_off_mm
 from eddyscan.physics.lift_off import LiftOffCurve
+from eddyscan.physics.slot import Slot, slot_warnings, to_slot_frame
+from eddyscan.physics.slot_solver import SlotSolver, slot_change_ohm
 
 __all__ = [
     "Coil",
     "Conductor",
     "Layer",
     "LiftOffCurve",
+    "Slot",
+    "SlotSolver",
     "air_inductance_h",
     "impedance_change_ohm",
     "impedance_ohm",
     "least_lift_off_mm",
     "skin_depth_mm",
+    "slot_change_ohm",
+    "slot_warnings",
+    "to_slot_frame",
 ]

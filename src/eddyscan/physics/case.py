@@ -18,6 +18,8 @@ from eddyscan.physics import checks
 from eddyscan.physics.coil import Coil, air_inductance_h
 from eddyscan.physics.conductor import Conductor
 from eddyscan.physics.impedance import impedance_ohm
+from eddyscan.physics.slot import Profile, Slot
+from eddyscan.physics.slot_solver import slot_change_ohm
 
 
 class Table(BaseModel):
@@ -66,20 +68,21 @@ class ConductorTable(Table):
         return value
 
 
-class SlotTable(Table):
+class SlotShape(Table):
     """[slot]: surface-breaking, its length along x, its middle at x = y = 0."""
 
     length_mm: float = Field(gt=0)
     depth_mm: float = Field(gt=0)
     opening_mm: float = Field(ge=0)
+    profile: Profile = "rectangular"
 
 
 class ScanTable(Table):
     """[scan]: where the coil's axis stands; x along the slot."""
 
     lift_off_mm: float = Field(ge=0)
-    x_mm: tuple[float, ...] = (0.0,)
-    y_mm: tuple[float, ...] = (0.0,)
+    x_mm: tuple[float, ...] = Field((0.0,), min_length=1)
+    y_mm: tuple[float, ...] = Field((0.0,), min_length=1)
 
     @field_validator("x_mm", "y_mm", mode="before")
     @classmethod
@@ -108,7 +111,7 @@ class SignalCase(Table):
     drive: DriveTable
     conductor: ConductorTable
     scan: ScanTable
-    slot: SlotTable | None = None
+    slot: SlotShape | None = None
 
     @model_validator(mode="after")
     def _slot_fits(self) -> SignalCase:
@@ -197,7 +200,16 @@ def solve_case(case: SignalCase) -> dict[str, Any]:
 
 def slot_signal_ohm(case: SignalCase) -> ComplexArray:
     """Return the slot's change of impedance at every position of the case (N,) [ohm]; zero without a slot."""
-    x_mm, _ = case.scan.positions_mm
+    x_mm, y_mm = case.scan.positions_mm
     if case.slot is None:
         return np.zeros(x_mm.shape, dtype=np.complex128)
-    raise TechniqueError("slot signals are not computed yet; leave out [slot] for the sound conductor.")
+    slot = Slot(case.slot.length_mm, case.slot.depth_mm, case.slot.opening_mm, case.slot.profile)
+    return slot_change_ohm(
+        slot,
+        case.physical_coil,
+        case.physical_conductor,
+        case.drive.frequency_hz,
+        x_mm=x_mm,
+        y_mm=y_mm,
+        lift_off_mm=case.scan.lift_off_mm,
+    )

@@ -119,3 +119,23 @@ def reflection(conductor: Conductor, k: Array, frequency_hz: float) -> ComplexAr
     """Return Gamma(k) = (k - Y) / (k + Y) of the whole stack (K,)."""
     admittance = surface_admittance(conductor.layers, k, frequency_hz)
     return np.asarray((k - admittance) / (k + admittance))
+
+
+def normal_admittance(layers: tuple[Layer, ...], k: Array, frequency_hz: float) -> ComplexArray:
+    """Return the transverse-magnetic admittance sigma / lambda [S] seen from above a stack; 0 above air.
+
+    The same transmission-line recursion with y = sigma / lambda: no current leaves a metal into air.
+    """
+    below: ComplexArray = np.zeros(np.shape(k), dtype=np.complex128)
+    for layer in reversed(layers):
+        if layer.conductivity_ms_m == 0:
+            below = np.zeros(np.shape(k), dtype=np.complex128)
+            continue
+        lam = layer_lambda(layer, k, frequency_hz)
+        own = layer.conductivity_s_m / lam
+        if layer.thickness_m is None:
+            below = own
+            continue
+        tanh = np.tanh(lam * layer.thickness_m)
+        below = own * (below + own * tanh) / (own + below * tanh)
+    return below

@@ -77,8 +77,8 @@ class LiftOffCurve:
         ----------
         impedance_ohm : (...) complex128 [ohm]
         noise_ohm : float or None
-            Standard deviation of the real and of the imaginary part of a
-            reading; 0.1 % of the coil's air reactance when None.
+            Root mean square of a reading's complex noise (both parts together);
+            0.1 % of the coil's air reactance when None.
 
         Returns
         -------
@@ -86,8 +86,8 @@ class LiftOffCurve:
             NaN where the nearest point lies outside the curve (a reading in air,
             or one "inside" the metal): such a spot has no known lift-off.
         sigma : (...) float64 [mm]
-            Standard uncertainty noise / |dZ/dh|, the Cramer-Rao bound of a
-            single complex reading with equal noise in both parts.
+            Standard uncertainty noise / (sqrt(2) |dZ/dh|): the Cramer-Rao bound
+            of one complex reading with the noise equal in both parts.
         """
         change = np.asarray(impedance_ohm, dtype=np.complex128) - self.air_ohm
         h = np.interp(-np.abs(change), -self._distance, self._knots)
@@ -97,6 +97,6 @@ class LiftOffCurve:
             step = np.real(np.conj(slope) * (change - self._change(h))) / np.abs(slope) ** 2
             h = np.clip(h + np.clip(step, -0.2 * spread, 0.2 * spread), -0.02 * spread, 1.02 * spread)
         noise = RELATIVE_NOISE * abs(self.air_ohm) if noise_ohm is None else noise_ohm
-        sigma = noise / np.abs(self._slope(h))
+        sigma = noise / (np.sqrt(2) * np.abs(self._slope(h)))
         known = (h >= -3 * sigma) & (h > -0.019 * spread) & (h <= spread)
         return np.where(known, h, np.nan), np.where(known, sigma, np.inf)

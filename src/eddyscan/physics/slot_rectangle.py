@@ -1,0 +1,132 @@
+"""Expansion of the dipole sheet on a rectangular slot.
+
+Basis sqrt(1 - (x/c)^2) U_m(x/c) sqrt(1 - (z/d)^2) U_2n(z/d): the right behaviour
+at the slot's edges, even about the surface. Its Fourier transforms are Bessel
+functions, pi c (m+1) (-j)^m J_(m+1)(u c)/(u c).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from eddyscan.core.frames import Array, ComplexArray, IntArray
+from eddyscan.physics.bessel_rules import product_rule
+from eddyscan.physics.metal import DepthProfile, SlottedMetal
+from eddyscan.physics.quadrature import gauss_panels
+from eddyscan.physics.slot_basis import Folding, chebyshev_nodes, fejer_weights
+
+
+@dataclass(frozen=True)
+class RectangleBasis:
+    """`along` x `down` functions on a slot of half length c and depth d [m]; index m * down + n."""
+
+    half_length_m: float
+    depth_m: float
+    along: int
+    down: int
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.along * self.down
+
+    def matrix(self, metal: SlottedMetal) -> ComplexArray:
+        """Return the symmetric Galerkin matrix (size, size) of the sheet's own field."""
+        c, d = self.half_length_m, self.depth_m
+        scales = [c, d, metal.skin_m, max(metal.opening_m, 0.02 * min(c, d, metal.skin_m))]
+        if metal.layer.thickness_m is not None:
+            scales.append(metal.layer.thickness_m)
+        smallest, largest = 0.02 / max(scales), 20.0 / min(scales)
+        x_orders = np.arange(1, self.along + 1)
+        z_orders = 2 * np.arange(self.down) + 1
+        x_rule = product_rule(x_orders, smallest=smallest * c, largest=largest * c)
+        z_rule = product_rule(z_orders, smallest=smallest * d, largest=largest * d)
+        px = x_rule.products * (_signs(x_orders, x_rule.pairs) * np.pi**2 * c)[:, None]
+        pz = z_rule.products * (_signs(z_orders, z_rule.pairs) * np.pi**2 * d)[:, None]
+        u, w = x_rule.nodes / c, z_rule.nodes / d
+        plane = px @ metal.plane_kernel(u[:, None] ** 2 + w**2) @ pz.T / (2 * np.pi**2)
+        edge = self._surface_terms(metal, u, px, z_rule.pairs, smallest)
+        return self._assemble(plane + edge, x_rule.pairs, z_rule.pairs)
+
+    def _surface_terms(
+        self, metal: SlottedMetal, u: Array, px: Array, z_pairs: IntArray, smallest: float
+    ) -> ComplexArray:
+        keep = u < 400 / min(self.half_length_m, self.depth_m, metal.skin_m)
+        u, px = u[keep], px[:, keep]
+        shortest = min(self.half_length_m, self.depth_m, metal.skin_m)
+        edges = smallest * 3.0 ** np.arange(np.log(1e3 / shortest / smallest) / np.log(3))
+        v, wv = gauss_panels(np.concatenate([[0.0], edges]), 7)
+        total = np.zeros((len(px), len(z_pairs)), dtype=np.complex128)
+        for start in range(0, len(u), 64):
+            rows = slice(start, start + 64)
+            uu, vv = np.repeat(u[rows], len(v)), np.tile(v, len(u[rows]))
+            for weight, profile in metal.terms(uu, vv):
+                depth = self.depth_transform(profile)
+                pair = depth[:, z_pairs[:, 0]] * depth[:, z_pairs[:, 1]] * weight[:, None]
+                folded = np.einsum("v,uvp->up", wv, pair.reshape(-1, len(v), len(z_pairs)))
+                total += px[:, rows] @ folded
+        return total / np.pi**2
+
+    def _assemble(self, values: ComplexArray, x_pairs: IntArray, z_pairs: IntArray) -> ComplexArray:
+        full = np.zeros((self.along, self.down, self.along, self.down), dtype=np.complex128)
+        (a, b), (p, q) = x_pairs.T, z_pairs.T
+        for i, j in ((a, b), (b, a)):
+            for k, m in ((p, q), (q, p)):
+                full[i[:, None], k, j[:, None], m] = values
+        return full.reshape(self.size, self.size)
+
+    def depth_transform(self, profile: DepthProfile) -> ComplexArray:
+        """Return the integral of each depth function times the profile (K, down) [m]."""
+        theta, weight = depth_angles(self.down)
+        z = -self.depth_m * np.cos(theta)
+        functions = np.sin(np.outer(2 * np.arange(self.down) + 1, theta)) * np.sin(theta) * weight * self.depth_m
+        return np.asarray(profile.values(z) @ functions.T)
+
+    @property
+    def highest_order(self) -> int:
+        """Highest order along the slot."""
+        return self.along
+
+    def field_nodes(self, count: int) -> Array:
+        """Return places x (count,) [m] along the slot where a coil's field is sampled."""
+        return chebyshev_nodes(self.half_length_m, count)
+
+    def line_weights(self, count: int) -> Array:
+        """Return weights (count,) [m] that integrate over x at these places."""
+        return fejer_weights(self.half_length_m, count)
+
+    def local_depth(self, x_m: float) -> float:
+        """Return the slot's depth [m] at x."""
+        return self.depth_m
+
+    def folding(self, profile: DepthProfile, count: int, scale: ComplexArray) -> Folding:
+        """Return the map from samples (P, count, K) and scales (H, K) to Galerkin integrals (P, H, size)."""
+        angle = np.arange(1, count + 1) * np.pi / (count + 1)
+        along = np.sin(np.outer(np.arange(1, self.along + 1), angle)) * np.sin(angle)
+        along *= self.half_length_m * np.pi / (count + 1)
+        heights = len(scale)
+        right = np.einsum("hk,kn->khn", scale, self.depth_transform(profile)).reshape(scale.shape[1], -1)
+        real, imaginary = np.ascontiguousarray(right.real), np.ascontiguousarray(right.imag)
+
+        def fold(samples: Array) -> ComplexArray:
+            left = np.matmul(along, samples).reshape(-1, samples.shape[2])
+            values = (left @ real + 1j * (left @ imaginary)).reshape(len(samples), self.along, heights, self.down)
+            return np.asarray(values.transpose(0, 2, 1, 3)).reshape(len(samples), heights, self.size)
+
+        return fold
+
+
+def _signs(orders: IntArray, pairs: IntArray) -> Array:
+    a, b = orders[pairs[:, 0]], orders[pairs[:, 1]]
+    return np.asarray(a * b * (-1.0) ** ((a - b) // 2))
+
+
+@lru_cache(maxsize=16)
+def depth_angles(down: int) -> tuple[Array, Array]:
+    """Return nodes and weights in z = -d cos(theta), graded towards the surface (theta = pi/2)."""
+    near = np.array([0.0, 0.003, 0.01, 0.03, 0.08, 0.18, 0.38])
+    rest = np.linspace(0.38, np.pi / 2, 2 + int(0.25 * (2 * down + 2)))[1:]
+    return gauss_panels(np.pi / 2 - np.concatenate([near, rest])[::-1], 8)
