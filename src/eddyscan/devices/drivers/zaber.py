@@ -170,7 +170,7 @@ class ZaberStage:
         for axis, answer in zip(going, told, strict=True):
             if answer.warning in HARMLESS or (homing and answer.warning in ("WR", "WH")):
                 continue
-            self.stop()
+            self._halt()
             self._ask(axis, "warnings clear")
             raise MotionError(
                 f"axis {axis.table.name} reports {axis.meaning(answer.warning)} at "
@@ -178,8 +178,16 @@ class ZaberStage:
                 "Free the axis, home the stage and run again."
             )
 
-    def _give_up(self, going: list[ConnectedAxis]) -> None:
+    def _halt(self) -> None:
+        """Stop after a fault and wait until every axis rests, at most as long as braking can take."""
         self.stop()
+        longest = max(axis.max_speed / axis.acceleration for axis in self._axes) + LOOK_S
+        until = self.clock.now() + longest
+        while any(self._look(axis).busy for axis in self._axes) and self.clock.now() < until:
+            self.clock.sleep(SOON_S)
+
+    def _give_up(self, going: list[ConnectedAxis]) -> None:
+        self._halt()
         places = ", ".join(f"{a.table.name} at {a.reading(a.last_count):.3f} {a.table.unit}" for a in going)
         raise MotionError(
             f"the stage says it moves but covered nothing for {self.settings.no_progress_s:g} s ({places}); "
@@ -192,7 +200,7 @@ class ZaberStage:
             told = self._look(axis) if axis.last_count != counts[i] else None
             off = axis.reading(axis.last_count) - axis.reading(int(counts[i]))
             if abs(off) > self.settings.tolerance:
-                self.stop()
+                self._halt()
                 flag = f", flag {told.warning}" if told and told.warning != "--" else ""
                 raise MotionError(
                     f"axis {axis.table.name} stands {off:+.4f} {axis.table.unit} from its target "

@@ -41,6 +41,7 @@ class ZaberLink:
         self._settings = settings
         self._lock = threading.Lock()
         self._axes: dict[tuple[int, int], Any] = {}
+        self._suspect = False
         self._connection = self._open()
 
     def tell(self, device: int, axis: int, command: str, *, retries: int = 0) -> Told:
@@ -63,29 +64,22 @@ class ZaberLink:
 
     def broadcast(self, command: str) -> None:
         """Send `command` to every device and wait for nobody; opens the line again when it is gone."""
+        self._trust()
         try:
             self._connection.generic_command_no_response(command)
         except Exception:
-            self.reopen()
+            self._suspect = True
+            self._trust()
             self._connection.generic_command_no_response(command)
 
-    def reopen(self) -> None:
-        """Open the line again after it was lost."""
+    def _trust(self) -> None:
+        """Open the line again when its last command failed: a cut line swallows what is written to it."""
         with self._lock:
-            self.close()
-            self._axes.clear()
-            self._connection = self._open()
-
-    def device(self, number: int) -> Any:
-        """Return the library's device object."""
-        return self._connection.get_device(number)
-
-    def call(self, what: str, action: Callable[[], Any]) -> Any:
-        """Run any library call with its faults in our words."""
-        try:
-            return action()
-        except Exception as fault:
-            raise self._in_our_words(fault, 0, what) from fault
+            if self._suspect:
+                self.close()
+                self._axes.clear()
+                self._connection = self._open()
+                self._suspect = False
 
     def close(self) -> None:
         """Close the line; more than once is fine."""
@@ -93,6 +87,7 @@ class ZaberLink:
             self._connection.close()
 
     def _axis(self, device: int, axis: int) -> Any:
+        self._trust()
         key = (device, axis)
         if key not in self._axes:
             owner = self._connection.get_device(device)
@@ -119,6 +114,7 @@ class ZaberLink:
     def _in_our_words(self, fault: Exception, device: int, command: str) -> DeviceError:
         kind, where = type(fault).__name__, f"Zaber device {device} at {self._settings.address}"
         if kind in LINK_FAULTS:
+            self._suspect = True
             return LinkError(
                 f"{where} gave no usable answer to {command!r} within {self._settings.request_timeout_s:g} s: {fault} "
                 "Check power and cable, then run again; everything recorded so far is kept."

@@ -77,7 +77,7 @@ class PvtSequence:
         self.disable(now)
         if words == ("disable",):
             return Answer()
-        if len(words) < 2 or words[0] != "live" or not all(w.isdigit() for w in words[1:]):
+        if len(words) < 2 or words[0] != "live" or not all(w.isascii() and w.isdigit() for w in words[1:]):
             return REFUSED
         numbers = [int(word) for word in words[1:]]
         if any(not 1 <= n <= len(self._all) for n in numbers):

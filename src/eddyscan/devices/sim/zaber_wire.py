@@ -40,7 +40,7 @@ def parse(line: bytes) -> Command | None:
         return None
     words = body.split()
     numbers: list[str] = []
-    while words and len(numbers) < 3 and words[0].isdigit():
+    while words and len(numbers) < 3 and words[0].isascii() and words[0].isdigit():
         numbers.append(words.pop(0))
     return Command(
         int(numbers[0]) if numbers else 0,
