@@ -74,5 +74,5 @@ def test_lift_off_of_another_record_is_refused(tmp_path: Path) -> None:
 def test_unknown_format_and_missing_folder(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written as 'xls'; known are csv"):
         export_record(record_of(), "xls", tmp_path / "r.xls")
-    with pytest.raises(FileError, match="does not exist. Make it first"):
+    with pytest.raises(FileError, match=r"does not exist\. Make it first"):
         export_record(record_of(), "csv", tmp_path / "no" / "r.csv")
