@@ -9,21 +9,28 @@ import numpy as np
 from eddyscan.analysis.background import explained, robust_sigma, slow_along_rows
 from eddyscan.analysis.detection import blob_score
 from eddyscan.analysis.edges import distance_to_rim_mm, edge_zone_mm
-from eddyscan.analysis.geometry import Footing, footing
 from eddyscan.analysis.indications import Signals, find_indications
 from eddyscan.analysis.mapping import map_to_surface
 from eddyscan.analysis.readings import Readings, usable
-from eddyscan.analysis.response import Projection, SoundResponse, sound_response, technique_coil, technique_conductor
 from eddyscan.analysis.result import AnalysisResult
+from eddyscan.core.footing import Footing, footing
 from eddyscan.core.frames import Array, BoolArray
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.record import ScanRecord
 from eddyscan.core.technique import Technique
+from eddyscan.physics.sound_response import (
+    Projection,
+    SoundResponse,
+    coil_by_air_reading,
+    curvature_gap_mm,
+    sound_response,
+    technique_coil,
+    technique_conductor,
+)
 
 SLOW_WINDOW_IN_DIAMETERS = 8.0
 FOOTPRINT_IN_MEAN_RADII = 0.6
-CURVATURE_RADIUS_SQUARED_IN_OUTER = 0.76
 
 
 def analyse(
@@ -59,7 +66,7 @@ def analyse(
     progress("lift-off", 1, 4)
     response = response_for(technique, readings.air_ohm, largest_tilt_deg=float(below.tilt_deg.max()))
     projection = response.project(readings.impedance_ohm, below.tilt_deg)
-    lift_off = projection.lift_off_mm - curvature_gap_mm(technique, below.curvature_per_mm)
+    lift_off = projection.lift_off_mm - curvature_gap_mm(response.coil, projection.lift_off_mm, below.curvature_per_mm)
     progress("residual", 2, 4)
     across = crack_channel(readings, below, projection, technique)
     signals = _signals(readings, below, projection, across, technique, mesh)
@@ -90,25 +97,17 @@ def probe_axis(readings: Readings, technique: Technique) -> Array | None:
 
 def response_for(technique: Technique, air_ohm: complex | None, *, largest_tilt_deg: float) -> SoundResponse:
     """Return the sound part's curve for a technique and the coil's air reading [ohm]."""
+    coil = technique_coil(technique)
+    if air_ohm is not None:
+        coil = coil_by_air_reading(coil, air_ohm, technique.drive.frequency_hz)
     return sound_response(
-        technique_coil(technique),
+        coil,
         technique_conductor(technique),
         technique.drive.frequency_hz,
         air_ohm=air_ohm,
         largest_lift_off_mm=2.0 * technique.analysis.lift_off_max_mm + 1.0,
         largest_tilt_deg=largest_tilt_deg,
     )
-
-
-def curvature_gap_mm(technique: Technique, curvature_per_mm: Array) -> Array:
-    """Return the extra lift-off a curved surface seems to have (M,) [mm].
-
-    r_eff^2 / 4 times the sum of the principal curvatures, convex positive, with
-    r_eff = 0.87 outer radii: first-order gap, checked against the series solution
-    for a conducting sphere.
-    """
-    r_squared = CURVATURE_RADIUS_SQUARED_IN_OUTER * technique.probe.outer_radius_mm**2
-    return np.asarray(0.25 * r_squared * curvature_per_mm)
 
 
 def crack_channel(readings: Readings, below: Footing, projection: Projection, technique: Technique) -> Array:

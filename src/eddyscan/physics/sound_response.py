@@ -1,6 +1,6 @@
 """What a sound part reads at every lift-off and tilt: the curve that readings are compared with.
 
-The curve is tabulated once from `physics.impedance_ohm` over the clearance of
+The curve is tabulated once from the physics over the clearance of
 the coil's rim (lift-off minus what tilt takes of it) and the tilt, so that every
 table entry is a coil above the metal. Readings are tied to it by what the coil
 reads in air: the wire's resistance and the cable shift the air point, a winding
@@ -16,11 +16,11 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from eddyscan import physics
+from eddyscan.core.errors import TechniqueError
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.core.technique import Technique
-from eddyscan.physics.coil import MU0, wave_numbers
-from eddyscan.physics.conductor import reflection
+from eddyscan.physics.coil import MU0, Coil, air_inductance_h, wave_numbers
+from eddyscan.physics.conductor import Conductor, reflection
 from eddyscan.physics.impedance import laplace_sum, power_spectrum
 
 CLEARANCE_KNOTS = 161
@@ -28,6 +28,7 @@ LARGEST_TILT_DEG = 30.0
 TILT_STEP_DEG = 4.5
 LAST_WAVE_NUMBER = 30.0
 NEWTON_STEPS = 8
+LARGEST_SIZE_ERROR = 0.2
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,8 @@ class SoundResponse:
 
     Attributes
     ----------
-    coil : physics.Coil
-    conductor : physics.Conductor
+    coil : Coil
+    conductor : Conductor
     frequency_hz : float [Hz]
     air_ohm : complex [ohm]
         Reading in air; the curve starts there.
@@ -72,8 +73,8 @@ class SoundResponse:
     largest_tilt_deg : float [deg]
     """
 
-    coil: physics.Coil
-    conductor: physics.Conductor
+    coil: Coil
+    conductor: Conductor
     frequency_hz: float
     air_ohm: complex
     reactance_air_ohm: float
@@ -128,8 +129,8 @@ class SoundResponse:
 
 
 def sound_response(
-    coil: physics.Coil,
-    conductor: physics.Conductor,
+    coil: Coil,
+    conductor: Conductor,
     frequency_hz: float,
     *,
     air_ohm: complex | None = None,
@@ -160,13 +161,13 @@ def sound_response(
 
 
 @lru_cache(maxsize=64)
-def _air_reactance_ohm(coil: physics.Coil, frequency_hz: float) -> float:
-    return float(2 * np.pi * frequency_hz * physics.air_inductance_h(coil))
+def _air_reactance_ohm(coil: Coil, frequency_hz: float) -> float:
+    return float(2 * np.pi * frequency_hz * air_inductance_h(coil))
 
 
 @lru_cache(maxsize=256)
 def _change_ohm(
-    coil: physics.Coil, conductor: physics.Conductor, frequency_hz: float, tilt_deg: float, largest_lift_off_mm: float
+    coil: Coil, conductor: Conductor, frequency_hz: float, tilt_deg: float, largest_lift_off_mm: float
 ) -> ComplexArray:
     """Return the change against air (CLEARANCE_KNOTS,) [ohm] at the table's clearances.
 
@@ -180,16 +181,52 @@ def _change_ohm(
     return np.asarray(scale * laplace_sum(k, spectrum, 2.0 * clearance_m))
 
 
-def technique_coil(technique: Technique) -> physics.Coil:
+def technique_coil(technique: Technique) -> Coil:
     """Return the technique's coil as drawn."""
     probe = technique.probe
-    return physics.Coil(probe.inner_radius_mm, probe.outer_radius_mm, probe.length_mm, probe.turns)
+    return Coil(probe.inner_radius_mm, probe.outer_radius_mm, probe.length_mm, probe.turns)
 
 
-def technique_conductor(technique: Technique) -> physics.Conductor:
+def technique_conductor(technique: Technique) -> Conductor:
     """Return the technique's metal as a half-space."""
-    return physics.Conductor.half_space(technique.part.conductivity_ms_m)
+    return Conductor.half_space(technique.part.conductivity_ms_m)
 
 
 def _spline(knots: Array, tilts: Array) -> Callable[[Array], RectBivariateSpline]:
     return lambda values: RectBivariateSpline(knots, tilts, values, kx=3, ky=min(3, len(tilts) - 1))
+
+
+def curvature_gap_mm(coil: Coil, lift_off_mm: Array, curvature_per_mm: Array) -> Array:
+    """Return the extra lift-off a curved surface seems to have (M,) [mm].
+
+    r_eff^2 / 4 times the sum of the principal curvatures (convex positive). The
+    line r_eff = r2 (0.793 + 0.6 h / r2) goes through the values of the series
+    solution for a conducting sphere, 1.25 mm at h = 0.1 mm and 1.37 mm at 0.3 mm
+    for r2 = 1.5 mm; constant beyond h = r2 / 2. First order: below a radius of ten
+    outer radii it is a guess.
+    """
+    r2 = coil.outer_radius_mm
+    effective = r2 * (0.793 + 0.6 * np.clip(lift_off_mm / r2, 0.0, 0.5))
+    return np.asarray(0.25 * effective**2 * curvature_per_mm)
+
+
+def coil_by_air_reading(coil: Coil, air_ohm: complex, frequency_hz: float) -> Coil:
+    """Return the coil scaled so that its air reactance is the measured one.
+
+    The number of turns is counted, sizes are not: at equal shape the inductance is
+    proportional to size, so a reactance 2 % high is a winding 2 % large.
+
+    Raises
+    ------
+    TechniqueError
+        When the reading is more than 20 % off: another coil, frequency or cable.
+    """
+    x0 = _air_reactance_ohm(coil, frequency_hz)
+    size = air_ohm.imag / x0
+    if not abs(size - 1.0) <= LARGEST_SIZE_ERROR:
+        raise TechniqueError(
+            f"the coil reads {air_ohm.imag:.4g} ohm of reactance in air, its drawing gives {x0:.4g} ohm "
+            f"({100 * (size - 1):+.0f} %, limit {100 * LARGEST_SIZE_ERROR:.0f} %). "
+            "Check the probe's dimensions and turns in the technique, the frequency and the cable."
+        )
+    return Coil(coil.inner_radius_mm * size, coil.outer_radius_mm * size, coil.length_mm * size, coil.turns)
