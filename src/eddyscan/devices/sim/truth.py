@@ -6,34 +6,165 @@ the steps are done and puts the answers into `summary.json` under `truth`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from eddyscan.core.frames import Array, angle_deg, apply, from_rotation_vector, invert
+from eddyscan.core.frames import Array, IntArray, angle_deg, apply, from_rotation_vector, invert
 from eddyscan.core.indication import Indication
 from eddyscan.core.mesh import SurfaceMesh
-from eddyscan.core.parts import NominalPart
+from eddyscan.core.parts import NominalPart, named_part
 from eddyscan.core.record import ScanRecord
 from eddyscan.devices.sim.flaws import Flaw
+from eddyscan.devices.sim.world_facts import facts_of
 from eddyscan.devices.sim.world_placement import surface_pose
-from eddyscan.devices.sim.world_probe import ProbeOverPart, TrueReading, reading_key
+from eddyscan.devices.sim.world_probe import reading_key
+from eddyscan.devices.sim.world_settings import WorldSettings
 
 NEAR_FLAW_MM = 3.0
 CONTACT_MM = -0.02
 COVERED_WITHIN_MM = 2.0
+OVER_PART_MM = 3.0
 FIT_STEPS = 8
 
 
+def surface_truth(mesh: SurfaceMesh, world: WorldSettings) -> dict[str, Any]:
+    """Return how far a reconstructed surface is from the exact one, in its own frame and after a best fit.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh [mm, part as reconstructed]
+        Its axes may be the part's or turned by 180 deg; the better is taken and told.
+    world : WorldSettings
+
+    Returns
+    -------
+    dict
+        `own` and `fit`: mean_abs_mm, rmse_mm, p95_mm, max_mm along the normal;
+        `coverage`: share of the exact top with a vertex within 2 mm (or 1.5
+        edges of a coarser mesh); `shift_mm` (3,), `turn_deg`: the best fit;
+        `turned`: whether the ends were exchanged.
+    """
+    part = named_part(world.part)
+    T_part_surface = surface_pose(part, mesh)
+    vertices = apply(T_part_surface, mesh.vertices)
+    T_fit = best_fit(part, vertices)
+    fitted = apply(T_fit, vertices)
+    edge = float(np.median(np.linalg.norm(vertices[mesh.faces[:, 0]] - vertices[mesh.faces[:, 1]], axis=1)))
+    reach = max(COVERED_WITHIN_MM, 1.5 * edge)
+    seen, _ = KDTree(fitted).query(part.top_mesh(2.0).vertices, distance_upper_bound=reach)
+    return {
+        "own": deviation(part.closest(vertices)[2]),
+        "fit": deviation(part.closest(fitted)[2]),
+        "coverage": round(float(np.isfinite(seen).mean()), 4),
+        "shift_mm": [round(float(s), 4) for s in T_fit[:3, 3]],
+        "turn_deg": round(angle_deg(T_fit), 4),
+        "turned": bool(T_part_surface[0, 0] < 0),
+    }
+
+
+def path_truth(
+    log: Mapping[str, Any], record: ScanRecord | None = None, *, lift_off_mm: float | None = None
+) -> dict[str, Any]:
+    """Return the true lift-off and tilt along a scan's path.
+
+    Parameters
+    ----------
+    log : mapping
+        `VirtualCell.truth_log()`: what really was at every reading.
+    record : ScanRecord or None
+        Its readings are found again by their impedance, and `stage_error_mm`
+        (true minus recorded) and `alignment` are told too. Without it, every
+        reading within 3 mm of the part counts.
+    lift_off_mm : float or None
+        The lift-off that was asked for; adds `lift_off_error_mm`.
+    """
+    columns = {name: np.asarray(log[name], dtype=float) for name in ("lift_off_mm", "tilt_deg", "near_edge")}
+    stage_mm = np.asarray(log["stage_mm"], dtype=float).reshape(-1, 3)
+    if record is None:
+        which = np.flatnonzero(columns["lift_off_mm"] < OVER_PART_MM)
+        result: dict[str, Any] = {"readings": len(which)}
+    else:
+        found = match_readings(log, record)
+        which = found[found >= 0]
+        error = stage_mm[which] - record.stage_mm[found >= 0]
+        result = {"readings": len(record), "matched": len(which)}
+        result["stage_error_mm"] = {axis: spread(error[:, k]) for k, axis in enumerate("xyz")}
+        result["alignment"] = _alignment(log, record)
+    lift_off = columns["lift_off_mm"][which]
+    result["lift_off_mm"] = spread(lift_off)
+    result["tilt_deg"] = spread(columns["tilt_deg"][which])
+    result["in_edge_zone"] = int(columns["near_edge"][which].sum())
+    result["contacts"] = int((lift_off < CONTACT_MM).sum())
+    if lift_off_mm is not None:
+        result["lift_off_error_mm"] = spread(lift_off - lift_off_mm)
+    return result
+
+
+def indication_truth(
+    indications: Sequence[Indication],
+    world: WorldSettings,
+    *,
+    mesh: SurfaceMesh | None = None,
+    log: Mapping[str, Any] | None = None,
+    record: ScanRecord | None = None,
+) -> dict[str, Any]:
+    """Return which flaws were found, missed or never crossed, and how many calls are false.
+
+    Parameters
+    ----------
+    indications : sequence of Indication [mm, part as reconstructed]
+    world : WorldSettings
+    mesh : SurfaceMesh or None
+        The reconstruction the indications lie on: tells whether its ends are exchanged.
+    log, record : as for `path_truth`
+        With both, each flaw tells the distance of the nearest reading.
+    """
+    facts = facts_of(world)
+    T_part_surface = surface_pose(facts.part, mesh)
+    near = [_nearest_flaw(facts.flaws, apply(T_part_surface, np.array([i.centre_mm]))[0]) for i in indications]
+    feet = None
+    if log is not None:
+        feet = np.asarray(log["foot_mm"], dtype=float).reshape(-1, 3)
+        if record is not None:
+            found = match_readings(log, record)
+            feet = feet[found[found >= 0]]
+    each = []
+    for number, flaw in enumerate(facts.flaws):
+        mine = [i for i, nearest in zip(indications, near, strict=True) if nearest == number]
+        each.append(flaw.as_dict() | {"found": bool(mine), "indications": [i.number for i in mine]})
+        if feet is not None and len(feet):
+            nearest_mm = float(np.linalg.norm(feet - flaw.centre_mm, axis=1).min())
+            each[-1]["nearest_reading_mm"] = round(nearest_mm, 3)
+    return {
+        "flaws": len(each),
+        "found": sum(bool(flaw["found"]) for flaw in each),
+        "false_calls": sum(number is None for number in near),
+        "each": each,
+    }
+
+
+def match_readings(log: Mapping[str, Any], record: ScanRecord) -> IntArray:
+    """Return for each reading of the record its place in the log (N,) int64, -1 where the cell did not take it."""
+    waiting: dict[tuple[str, str], list[int]] = {}
+    for k, (real, imaginary) in enumerate(zip(log["resistance_ohm"], log["reactance_ohm"], strict=True)):
+        waiting.setdefault(reading_key(complex(real, imaginary)), []).append(k)
+    places = []
+    for z in record.impedance_ohm:
+        entries = waiting.get(reading_key(complex(z)), [])
+        places.append(entries.pop(0) if entries else -1)
+    return np.array(places, dtype=np.int64)
+
+
 def spread(values: Array, digits: int = 4) -> dict[str, float]:
-    """Return mean, std, p95 of the magnitude, least and largest of some values."""
+    """Return mean, sd, p95 of the magnitude, least and largest of some values."""
     if values.size == 0:
         return {}
     figures = {
         "mean": values.mean(),
-        "std": values.std(),
+        "sd": values.std(),
         "p95_abs": np.percentile(np.abs(values), 95),
         "min": values.min(),
         "max": values.max(),
@@ -49,146 +180,39 @@ def deviation(signed_mm: Array) -> dict[str, float]:
     return {name: round(float(figure), 4) for name, figure in zip(names, figures, strict=True)}
 
 
-class CellTruth:
-    """The truth about one virtual cell."""
+def best_fit(part: NominalPart, vertices: Array) -> Array:
+    """Return the rigid motion that brings vertices onto the exact surface, point to plane, far ones left out."""
+    T: Array = np.eye(4)
+    some = vertices[:: max(1, len(vertices) // 8000)]
+    for _ in range(FIT_STEPS):
+        at = apply(T, some)
+        _, normal, distance = part.closest(at)
+        size = np.abs(distance)
+        keep = size <= max(3 * 1.4826 * float(np.median(size)), 0.02)
+        J = np.hstack([np.cross(at, normal), normal])[keep]
+        A = J.T @ J + 1e-6 * len(J) * np.eye(6)
+        move = np.asarray(np.linalg.solve(A, -J.T @ distance[keep]), dtype=np.float64)
+        T = from_rotation_vector(move[:3], move[3:]) @ T
+        if np.abs(move[3:]).max() < 1e-5 and np.abs(move[:3]).max() < 1e-7:
+            break
+    return T
 
-    def __init__(self, part: NominalPart, T_stage_part: Array, flaws: tuple[Flaw, ...], probe: ProbeOverPart) -> None:
-        self._part, self._T_stage_part, self._flaws, self._probe = part, T_stage_part, flaws, probe
-        self._T_part_surface = surface_pose(part)
 
-    def surface_truth(self, mesh: SurfaceMesh) -> dict[str, Any]:
-        """Return how far a reconstructed surface is from the exact one, in its own frame and after a best fit.
+def _alignment(log: Mapping[str, Any], record: ScanRecord) -> dict[str, float]:
+    """Return how far the scan's T_stage_part is from the true one, at the middle of its readings."""
+    T_true = np.asarray(log["T_stage_part"], dtype=float)
+    T_part_surface = np.asarray(log["T_part_surface"], dtype=float)
+    T_believed = record.T_stage_part @ invert(T_part_surface)
+    middle = apply(invert(T_believed), record.stage_mm.mean(axis=0)[None])
+    shift = apply(T_believed, middle) - apply(T_true, middle)
+    turn = angle_deg(invert(T_true) @ T_believed)
+    return {"shift_mm": round(float(np.linalg.norm(shift)), 4), "turn_deg": round(turn, 4)}
 
-        Parameters
-        ----------
-        mesh : SurfaceMesh [mm, part as reconstructed]
-            Its axes may be the part's or turned by 180 deg; the better is taken and told.
 
-        Returns
-        -------
-        dict
-            `own` and `fit`: mean_abs_mm, rmse_mm, p95_mm, max_mm along the normal;
-            `coverage`: share of the exact top with a vertex within 2 mm (or 1.5
-            edges of a coarser mesh); `shift_mm` (3,), `turn_deg`: the best fit;
-            `turned`: whether the ends were exchanged.
-        """
-        self._T_part_surface = surface_pose(self._part, mesh)
-        vertices = apply(self._T_part_surface, mesh.vertices)
-        own = self._part.closest(vertices)[2]
-        T_fit = self._best_fit(vertices)
-        fitted = apply(T_fit, vertices)
-        edge = float(np.median(np.linalg.norm(vertices[mesh.faces[:, 0]] - vertices[mesh.faces[:, 1]], axis=1)))
-        reach = max(COVERED_WITHIN_MM, 1.5 * edge)
-        seen, _ = KDTree(fitted).query(self._part.top_mesh(2.0).vertices, distance_upper_bound=reach)
-        return {
-            "own": deviation(own),
-            "fit": deviation(self._part.closest(fitted)[2]),
-            "coverage": round(float(np.isfinite(seen).mean()), 4),
-            "shift_mm": [round(float(s), 4) for s in T_fit[:3, 3]],
-            "turn_deg": round(angle_deg(T_fit), 4),
-            "turned": bool(self._T_part_surface[0, 0] < 0),
-        }
-
-    def path_truth(self, record: ScanRecord, target_mm: float | None = None) -> dict[str, Any]:
-        """Return the true lift-off and tilt along a recorded path, and how far the record's positions are off.
-
-        Readings are found again by their impedance, so only those of this
-        session of the cell can be told; `matched` says how many.
-        """
-        truths = self.true_readings(record)
-        known = [k for k, t in enumerate(truths) if t is not None]
-        found = [t for t in truths if t is not None]
-        lift_off = np.array([t.lift_off_mm for t in found])
-        inside = np.array([not t.near_edge for t in found], dtype=bool)
-        stage_error = np.array([t.stage_mm for t in found]).reshape(-1, 3) - record.stage_mm[known]
-        result: dict[str, Any] = {
-            "readings": len(record),
-            "matched": len(found),
-            "lift_off_mm": spread(lift_off),
-            "tilt_deg": spread(np.array([t.tilt_deg for t in found])),
-            "in_edge_zone": int((~inside).sum()),
-            "contacts": int((lift_off < CONTACT_MM).sum()),
-            "stage_error_mm": {axis: spread(stage_error[:, k]) for k, axis in enumerate("xyz")},
-            "alignment": self._alignment(record),
-        }
-        if target_mm is not None:
-            result["lift_off_error_mm"] = spread(lift_off - target_mm)
-        return result
-
-    def indication_truth(self, indications: Sequence[Indication], record: ScanRecord | None = None) -> dict[str, Any]:
-        """Return which flaws were found, missed or never crossed, and which calls are false."""
-        near = [self._nearest_flaw(indication) for indication in indications]
-        flaws = []
-        for number, flaw in enumerate(self._flaws):
-            mine = [k for k, flaw_number in enumerate(near) if flaw_number == number]
-            flaws.append(
-                flaw.as_dict()
-                | {"found": bool(mine), "indications": [indications[k].number for k in mine]}
-                | self._crossing(flaw, record)
-            )
-        return {
-            "flaws": flaws,
-            "found": sum(bool(flaw["found"]) for flaw in flaws),
-            "of": len(flaws),
-            "false_calls": sum(number is None for number in near),
-        }
-
-    def true_readings(self, record: ScanRecord) -> list[TrueReading | None]:
-        """Return the truth behind each reading (None where this cell did not take it): for benchmarks and tests."""
-        waiting = {key: list(entries) for key, entries in self._probe.log.items()}
-        found: list[TrueReading | None] = []
-        for z in record.impedance_ohm:
-            entries = waiting.get(reading_key(complex(z)), [])
-            found.append(entries.pop(0) if entries else None)
-        return found
-
-    def true_pose(self) -> Array:
-        """Return T_stage_part: for benchmarks and tests."""
-        return self._T_stage_part
-
-    def flaws(self) -> list[dict[str, Any]]:
-        """Return every flaw in the part's own frame: for benchmarks and tests."""
-        return [flaw.as_dict() for flaw in self._flaws]
-
-    def _best_fit(self, vertices: Array) -> Array:
-        """Return the rigid motion that brings vertices onto the exact surface, point to plane, far ones left out."""
-        T: Array = np.eye(4)
-        step = max(1, len(vertices) // 20000)
-        some = vertices[::step]
-        for _ in range(FIT_STEPS):
-            at = apply(T, some)
-            _, normal, distance = self._part.closest(at)
-            size = np.abs(distance)
-            keep = size <= max(3 * 1.4826 * float(np.median(size)), 0.02)
-            J = np.hstack([np.cross(at, normal), normal])[keep]
-            A = J.T @ J + 1e-6 * len(J) * np.eye(6)
-            move = np.asarray(np.linalg.solve(A, -J.T @ distance[keep]), dtype=np.float64)
-            T = from_rotation_vector(move[:3], move[3:]) @ T
-        return T
-
-    def _alignment(self, record: ScanRecord) -> dict[str, float]:
-        """Return how far the scan's T_stage_part is from the true one, at the middle of the part."""
-        middle = self._part.top_mesh(8.0).vertices.mean(axis=0)[None]
-        T_believed = record.T_stage_part @ invert(self._T_part_surface)
-        shift = apply(T_believed, middle) - apply(self._T_stage_part, middle)
-        turn = angle_deg(invert(self._T_stage_part) @ T_believed)
-        return {"shift_mm": round(float(np.linalg.norm(shift)), 4), "turn_deg": round(turn, 4)}
-
-    def _nearest_flaw(self, indication: Indication) -> int | None:
-        """Return the number of the flaw an indication belongs to, None for a false call."""
-        at = apply(self._T_part_surface, np.array([indication.centre_mm]))[0]
-        for number, flaw in sorted(
-            enumerate(self._flaws), key=lambda item: float(np.linalg.norm(item[1].centre_mm - at))
-        ):
-            if np.linalg.norm(flaw.centre_mm - at) <= NEAR_FLAW_MM + flaw.size.length_mm / 2:
-                return number
-        return None
-
-    def _crossing(self, flaw: Flaw, record: ScanRecord | None) -> dict[str, Any]:
-        """Return how near the readings came to a flaw."""
-        if record is None:
-            return {}
-        feet = np.array([t.foot_mm for t in self.true_readings(record) if t is not None]).reshape(-1, 3)
-        if len(feet) == 0:
-            return {"nearest_reading_mm": None}
-        return {"nearest_reading_mm": round(float(np.linalg.norm(feet - flaw.centre_mm, axis=1).min()), 3)}
+def _nearest_flaw(flaws: tuple[Flaw, ...], at: Array) -> int | None:
+    """Return the number of the flaw that a spot (3,) [mm, part] belongs to, None when it is a false call."""
+    distances = [float(np.linalg.norm(flaw.centre_mm - at)) for flaw in flaws]
+    for number in np.argsort(distances):
+        if distances[number] <= NEAR_FLAW_MM + flaws[number].size.length_mm / 2:
+            return int(number)
+    return None

@@ -9,19 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from eddyscan.core.frames import Array
 from eddyscan.core.mesh import SurfaceMesh
-from eddyscan.core.parts import named_part
 from eddyscan.devices.protocols import Clock
 from eddyscan.devices.sim.camera import VirtualDepthCamera
-from eddyscan.devices.sim.flaws import flaws_of
 from eddyscan.devices.sim.lcr import LcrSimulator
-from eddyscan.devices.sim.truth import CellTruth
-from eddyscan.devices.sim.world_foot import FootFinder
-from eddyscan.devices.sim.world_placement import hidden_pose, operators_pose, surface_pose
+from eddyscan.devices.sim.world_facts import facts_of
+from eddyscan.devices.sim.world_placement import operators_pose, surface_pose
 from eddyscan.devices.sim.world_probe import ProbeOverPart, StagePosition, TrueReading
 from eddyscan.devices.sim.world_scene import build_scene
 from eddyscan.devices.sim.world_settings import WorldSettings
@@ -70,12 +68,9 @@ class VirtualCell:
 
     def __init__(self, settings: WorldSettings, clock: Clock) -> None:
         self.settings, self.clock = settings, clock
-        self._part = named_part(settings.part)
-        finder = FootFinder(self._part)
-        flaws = flaws_of(settings, self._part, finder)
-        self._T_stage_part = hidden_pose(self._part, settings.placement, settings.seed)
-        self._probe = ProbeOverPart(settings, self._part, self._T_stage_part, flaws, finder)
-        self._truth = CellTruth(self._part, self._T_stage_part, flaws, self._probe)
+        self._facts = facts_of(settings)
+        self._probe = ProbeOverPart(settings, self._facts)
+        self._T_part_surface = surface_pose(self._facts.part)
         self._addresses: CellAddresses | None = None
         self._camera: VirtualDepthCamera | None = None
 
@@ -128,12 +123,25 @@ class VirtualCell:
             the part's drawing; the operator jogs to the corner that the picture
             shows as origin.
         """
-        believed = operators_pose(self._T_stage_part, self.settings.placement, self.settings.seed)
-        return np.asarray(believed @ surface_pose(self._part, surface))
+        self._T_part_surface = surface_pose(self._facts.part, surface)
+        believed = operators_pose(self._facts.T_stage_part, self.settings.placement, self.settings.seed)
+        return np.asarray(believed @ self._T_part_surface)
 
-    def truth(self) -> CellTruth:
-        """Return the judge: for summary.json, benchmarks and tests, never for a step of the line."""
-        return self._truth
+    def truth_log(self) -> dict[str, Any]:
+        """Return what really was at every reading, JSON-able: for the truth part of summary.json alone."""
+        readings = self._probe.history
+        return {
+            "T_stage_part": self._facts.T_stage_part.tolist(),
+            "T_part_surface": self._T_part_surface.tolist(),
+            "resistance_ohm": [z.real for z, _ in readings],
+            "reactance_ohm": [z.imag for z, _ in readings],
+            "time_s": [t.time_s for _, t in readings],
+            "stage_mm": [t.stage_mm.tolist() for _, t in readings],
+            "foot_mm": [t.foot_mm.tolist() for _, t in readings],
+            "lift_off_mm": [t.lift_off_mm for _, t in readings],
+            "tilt_deg": [t.tilt_deg for _, t in readings],
+            "near_edge": [bool(t.near_edge) for _, t in readings],
+        }
 
     def close(self) -> None:
         """Stop the devices."""

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from eddyscan.core.frames import Array, apply, invert
-from eddyscan.core.parts import NominalPart
-from eddyscan.devices.sim.flaws import Flaw
 from eddyscan.devices.sim.instrument_physics import CoilResponse, curvature_gap_mm, edge_zone_mm, real_coil
 from eddyscan.devices.sim.instrument_physics_noise import ReadingNoise
+from eddyscan.devices.sim.world_facts import CellFacts
 from eddyscan.devices.sim.world_foot import FootFinder
 from eddyscan.devices.sim.world_placement import knocked
 from eddyscan.devices.sim.world_settings import WorldSettings
@@ -52,31 +51,23 @@ class TrueReading:
 class ProbeOverPart:
     """The coil on the true part, at the place where the stage really is."""
 
-    def __init__(
-        self,
-        settings: WorldSettings,
-        part: NominalPart,
-        T_stage_part: Array,
-        flaws: tuple[Flaw, ...],
-        finder: FootFinder,
-    ) -> None:
-        self._settings, self._part, self._flaws, self._finder = settings, part, flaws, finder
-        self._T_part_stage = invert(T_stage_part)
-        self._T_knocked = invert(knocked(T_stage_part, settings.faults.part_shift_mm))
+    def __init__(self, settings: WorldSettings, facts: CellFacts) -> None:
+        self._settings, self._flaws = settings, facts.flaws
+        self._finder = FootFinder(facts.part)
+        self._T_part_stage = invert(facts.T_stage_part)
+        self._T_knocked = invert(knocked(facts.T_stage_part, settings.faults.part_shift_mm))
         lean = settings.placement.probe_tilt_deg * np.random.default_rng([settings.seed, 10]).uniform(-1, 1, 2)
         self._axis_stage = Rotation.from_euler("xy", lean, degrees=True).apply([0.0, 0.0, -1.0])
         self.coil = real_coil(settings.coil, settings.instrument.coil_tolerance, settings.seed)
         self.conductor = Conductor.half_space(settings.conductivity_ms_m)
         self.noise = ReadingNoise(settings.instrument, settings.seed)
-        self.log: dict[tuple[str, str], list[TrueReading]] = {}
-        self.history: list[TrueReading] = []
-        self.count = 0
+        self.history: list[tuple[complex, TrueReading]] = []
         self._responses: dict[float, CoilResponse] = {}
 
     def pose(self, stage_mm: Array, time_s: float) -> TrueReading:
         """Return the truth for a coil position (3,) [mm, stage]."""
         shift_after = self._settings.faults.part_shift_after
-        T = self._T_knocked if shift_after and self.count >= shift_after else self._T_part_stage
+        T = self._T_knocked if shift_after and len(self.history) >= shift_after else self._T_part_stage
         at = apply(T, stage_mm[None, :3])[0]
         foot = self._finder.at(at)
         axis = T[:3, :3] @ self._axis_stage
@@ -101,9 +92,7 @@ class ProbeOverPart:
 
     def remember(self, as_read_ohm: complex, truth: TrueReading) -> None:
         """File the truth under the impedance that the wire carried, which is all the software will know."""
-        self.log.setdefault(reading_key(as_read_ohm), []).append(truth)
-        self.history.append(truth)
-        self.count += 1
+        self.history.append((as_read_ohm, truth))
 
     def _response(self, frequency_hz: float) -> CoilResponse:
         if frequency_hz not in self._responses:
