@@ -10,6 +10,8 @@ from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.topology import Edges
 
 STEEPEST = 4.0
+# Rows may lie this much further apart when that saves one: fields are good to half a percent.
+STRETCH = 0.004
 
 
 def plane_levels(
@@ -50,7 +52,7 @@ def plane_levels(
 
 def even_levels(low: float, high: float, pitch_mm: float) -> Array:
     """Return level values an equal pitch (or a little less) apart, half a pitch inside both ends."""
-    n = max(1, int(np.ceil((high - low) / pitch_mm - 1e-3)))
+    n = max(1, int(np.ceil((high - low) / (pitch_mm * (1 + STRETCH)))))
     return low + (np.arange(n) + 0.5) * (high - low) / n
 
 

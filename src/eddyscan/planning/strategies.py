@@ -5,6 +5,8 @@ from __future__ import annotations
 from eddyscan.core.frames import Array
 from eddyscan.core.technique import Plan
 from eddyscan.planning.families import even_levels, plane_levels, ring_field, span_inside
+from eddyscan.planning.fields import distance_field
+from eddyscan.planning.geodesic import field_mesh, geodesic_lines
 from eddyscan.planning.levels import Line, clipped, level_lines
 from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.topology import edges_of
@@ -18,6 +20,10 @@ def lines_for(surface: SmoothSurface, settings: Plan, guard: Array) -> list[Line
     inside = guard > 0
     if not inside.any():
         return []
+    if settings.strategy == "geodesic":
+        mesh = field_mesh(surface)
+        field = distance_field(mesh.calculus, mesh.seeds[0])
+        return geodesic_lines(mesh, field, guard, settings.pitch_mm)
     edges = edges_of(surface.faces)
     if settings.strategy == "encircle":
         field = ring_field(surface, inside)

@@ -1,0 +1,63 @@
+"""Rows at constant distance on the surface: level sets of the distance from a seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eddyscan.core.frames import Array
+from eddyscan.planning.families import even_levels, span_inside
+from eddyscan.planning.fields import Gradients, Seed, distance_field, gradients
+from eddyscan.planning.holes import Filled, fill_holes
+from eddyscan.planning.levels import Line, clipped, level_lines
+from eddyscan.planning.seeds import seeds_for
+from eddyscan.planning.smooth import SmoothSurface
+from eddyscan.planning.topology import Edges, edges_of
+
+
+@dataclass(frozen=True)
+class FieldMesh:
+    """A patch made ready for fields: holes closed, edges and calculus at hand."""
+
+    filled: Filled
+    edges: Edges
+    calculus: Gradients
+    seeds: list[Seed]
+
+
+def field_mesh(surface: SmoothSurface) -> FieldMesh:
+    """Close the patch's holes and find seeds."""
+    filled = fill_holes(surface.vertices, surface.faces, surface.normals)
+    return FieldMesh(
+        filled,
+        edges_of(filled.faces),
+        gradients(filled.vertices, filled.faces),
+        seeds_for(filled, surface.normals),
+    )
+
+
+def geodesic_lines(mesh: FieldMesh, field: Array, guard: Array, pitch_mm: float) -> list[Line]:
+    """Return level lines of a distance field at an even pitch, cut to the guarded region.
+
+    Parameters
+    ----------
+    field : (V',) [mm], on the filled mesh
+    guard : (V,), of the patch; positive inside
+    """
+    whole = guarded(mesh, guard)
+    if not (whole > 0).any():
+        return []
+    levels = even_levels(*span_inside(field, whole, mesh.edges), pitch_mm)
+    lines = level_lines(mesh.filled.vertices, mesh.filled.faces, mesh.edges, field, levels, whole)
+    return [piece for line in lines for piece in clipped(line)]
+
+
+def guarded(mesh: FieldMesh, guard: Array) -> Array:
+    """Carry a patch's guard (V,) to the filled mesh (V',): negative inside fillings."""
+    extra = len(mesh.filled.vertices) - len(guard)
+    whole = np.concatenate([guard, np.full(extra, np.inf)])
+    return np.asarray(np.minimum(np.minimum(whole, mesh.filled.hole_mm), 1e6))
+
+
+__all__ = ["FieldMesh", "distance_field", "field_mesh", "geodesic_lines", "guarded"]

@@ -1,0 +1,154 @@
+"""Where rows may start from: a curve through the middle, a round border, the end of a tube, a pole."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from eddyscan.core.frames import Array, IntArray
+from eddyscan.planning.fields import Seed
+from eddyscan.planning.holes import Filled
+from eddyscan.planning.levels import level_lines
+from eddyscan.planning.topology import edges_of
+
+CORNER_DEG = 35.0
+CORNER_REACH_MM = 2.5
+ROUND_ENOUGH = 1.6
+
+
+def seeds_for(mesh: Filled, normals: Array) -> list[Seed]:
+    """Return seeds to lay rows from, the most promising first."""
+    middles = [*_between_sides(mesh), *_planes(mesh, normals)]
+    across = [seed for f in middles if (seed := middle_seed(mesh, f)) is not None]
+    smooth = [loop for loop in mesh.outer if not has_corners(mesh.vertices, loop)]
+    if not mesh.outer:
+        return [pole_seed(mesh), *across]
+    if len(smooth) == len(mesh.outer) and (len(mesh.outer) > 1 or _aspect(mesh, normals) < ROUND_ENOUGH):
+        return [border_seed(mesh, smooth[0]), *across]
+    return across
+
+
+def middle_seed(mesh: Filled, f: Array) -> Seed | None:
+    """Return the zero line of a vertex field (V',) as the seed, or None when there is none."""
+    lines = level_lines(mesh.vertices, mesh.faces, edges_of(mesh.faces), f, np.zeros(1), np.ones(len(f)))
+    if not lines:
+        return None
+    corner = f[mesh.faces]
+    crossed = (corner.min(axis=1) <= 0) & (corner.max(axis=1) > 0)
+    vertex = np.unique(mesh.faces[crossed])
+    side = np.where(f > 0, 1.0, -1.0)
+    return Seed(vertex, side[vertex] * _to_lines(mesh.vertices[vertex], [line.points for line in lines]), side)
+
+
+def border_seed(mesh: Filled, loop: IntArray) -> Seed:
+    """Return a whole border as the seed."""
+    return Seed(loop, np.zeros(len(loop)), np.ones(len(mesh.vertices)))
+
+
+def pole_seed(mesh: Filled) -> Seed:
+    """Return the vertex furthest along the body's longest axis and its neighbours as the seed."""
+    used = np.unique(mesh.faces)
+    d = mesh.vertices[used] - mesh.vertices[used].mean(axis=0)
+    axis = np.linalg.svd(d, full_matrices=False)[2][0]
+    pole = used[int(np.argmax(d @ axis))]
+    ring = np.unique(mesh.faces[(mesh.faces == pole).any(axis=1)])
+    return Seed(ring, np.linalg.norm(mesh.vertices[ring] - mesh.vertices[pole], axis=1), np.ones(len(mesh.vertices)))
+
+
+def has_corners(vertices: Array, loop: IntArray) -> bool:
+    """Tell whether a border turns sharply anywhere, seen over a few mm to either side."""
+    return bool((_turns_deg(vertices, loop) > CORNER_DEG).any())
+
+
+def _turns_deg(vertices: Array, loop: IntArray) -> Array:
+    """Return how much more (n,) [deg] a border turns at each vertex than a round one would."""
+    points = vertices[loop]
+    step = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1)
+    s, total = np.concatenate([[0.0], np.cumsum(step)[:-1]]), float(step.sum())
+    reach = max(CORNER_REACH_MM, 2.0 * float(np.median(step)))
+    if total < 12 * reach:
+        return np.full(len(loop), 180.0)
+    x = np.concatenate([s, [total]])
+    closed = np.concatenate([points, points[:1]])
+
+    def at(where: Array) -> Array:
+        return np.stack([np.interp(where % total, x, closed[:, k]) for k in range(3)], axis=1)
+
+    before, after = points - at(s - reach), at(s + reach) - points
+    cosine = np.einsum("nk,nk->n", before, after)
+    cosine /= np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-12)
+    # A round border of this length turns by 2 pi reach / total over the reach.
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))) - 360 * reach / total)
+
+
+def _between_sides(mesh: Filled) -> list[Array]:
+    """Return, for a border with four corners, how much nearer (V',) one side is than its opposite: long sides first."""
+    if len(mesh.outer) != 1:
+        return []
+    loop = mesh.outer[0]
+    corner = _peaks(_turns_deg(mesh.vertices, loop), mesh.vertices[loop])
+    if len(corner) != 4:
+        return []
+    loop, corner = np.roll(loop, -corner[0]), corner - corner[0]
+    ends = [*corner.tolist(), len(loop)]
+    sides = [mesh.vertices[np.take(loop, np.arange(a, b + 1), mode="wrap")] for a, b in pairwise(ends)]
+    length = [float(np.linalg.norm(np.diff(side, axis=0), axis=1).sum()) for side in sides]
+    pairs = [(0, 2), (1, 3)] if length[0] + length[2] >= length[1] + length[3] else [(1, 3), (0, 2)]
+    return [_to_lines(mesh.vertices, [sides[a]]) - _to_lines(mesh.vertices, [sides[b]]) for a, b in pairs]
+
+
+def _peaks(turn_deg: Array, points: Array) -> IntArray:
+    """Return the sharpest vertex (K,) of each corner in running order."""
+    left = np.where(turn_deg > CORNER_DEG, turn_deg, 0.0)
+    found = []
+    while left.max() > 0:
+        best = int(np.argmax(left))
+        found.append(best)
+        left[np.linalg.norm(points - points[best], axis=1) < 3 * CORNER_REACH_MM] = 0.0
+    return np.sort(np.asarray(found, dtype=np.int64))
+
+
+def _planes(mesh: Filled, normals: Array) -> list[Array]:
+    middle = mesh.vertices[np.unique(mesh.faces)].mean(axis=0)
+    return [(mesh.vertices - middle) @ direction for direction in _directions(mesh, normals)]
+
+
+def _directions(mesh: Filled, normals: Array) -> list[Array]:
+    """Return the normals of planes through the middle, those that need the fewest rows first."""
+    used = np.unique(mesh.faces[: mesh.n_faces])
+    points = mesh.vertices[used] - mesh.vertices[used].mean(axis=0)
+    up = normals[used].mean(axis=0)
+    if np.linalg.norm(up) < 0.2:
+        return list(np.linalg.svd(points, full_matrices=False)[2])
+    up /= np.linalg.norm(up)
+    x = np.array([1.0, 0.0, 0.0]) - up[0] * up
+    if np.linalg.norm(x) < 0.1:
+        x = np.array([0.0, 1.0, 0.0]) - up[1] * up
+    x /= np.linalg.norm(x)
+    y = np.cross(up, x)
+    angle = np.radians(np.arange(0, 180, 5))
+    ways = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
+    width = np.ptp(points @ ways.T, axis=0)
+    best = int(np.argmin(np.round(width, 3)))
+    return [ways[best], ways[(best + len(ways) // 2) % len(ways)]]
+
+
+def _aspect(mesh: Filled, normals: Array) -> float:
+    points = mesh.vertices[np.unique(mesh.faces[: mesh.n_faces])]
+    ways = _directions(mesh, normals)[:2]
+    spans = [float(np.ptp(points @ way)) for way in ways]
+    return max(spans) / max(min(spans), 1e-9)
+
+
+def _to_lines(points: Array, lines: list[Array]) -> Array:
+    """Return the distance (N,) of points near polylines."""
+    start = np.concatenate([line[:-1] for line in lines])
+    end = np.concatenate([line[1:] for line in lines])
+    _, near = KDTree((start + end) / 2).query(points, k=min(6, len(start)))
+    near = np.asarray(near).reshape(len(points), -1)
+    a, d = start[near], (end - start)[near]
+    t = np.einsum("nkj,nkj->nk", points[:, None] - a, d) / np.maximum(np.einsum("nkj,nkj->nk", d, d), 1e-12)
+    foot = a + np.clip(t, 0, 1)[..., None] * d
+    return np.asarray(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1))
