@@ -190,6 +190,11 @@ def whole_inspection(pitch_mm: float = 5.0, step_mm: float = 5.0, edge_mm: float
     )
 
 
+def small_inspection() -> ReportContent:
+    """Return the whole inspection with few points, for tests that do not look at it."""
+    return whole_inspection(pitch_mm=16.0, step_mm=12.0, edge_mm=9.0)
+
+
 def without(content: ReportContent, *names: str) -> ReportContent:
     """Return the content with the named fields as if they had never been made."""
     blank = ReportContent(content.technique)

@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names and values, read line by line."""
+    """Names and values, read line by line; `wide` ones stand alone in two columns."""
 
     rows: tuple[tuple[str, str], ...]
     title: str = ""
+    wide: bool = False
 
 
 @dataclass(frozen=True)

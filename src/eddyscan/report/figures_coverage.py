@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from eddyscan.core.cscan import CScan
 from eddyscan.core.frames import Array
 from eddyscan.core.mesh import SurfaceMesh, face_vectors
-from eddyscan.report.theme import Theme, canvas, map_axes
+from eddyscan.report.theme import Theme, canvas, map_axes, map_height_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,12 +28,18 @@ def examined_share(cscan: CScan) -> float:
     return float(areas[cscan.covered].sum() / max(areas.sum(), 1e-12))
 
 
+def share_texts(share: float) -> tuple[str, str]:
+    """Return examined and not examined as percentages that add up; the examined one is never rounded up."""
+    tenths = math.floor(1000 * share + 1e-9)
+    return f"{tenths / 10:.1f} %", f"{(1000 - tenths) / 10:.1f} %"
+
+
 def coverage_figure(cscan: CScan, theme: Theme) -> Figure:  # noqa: ARG001 - every drawing takes a theme
     """Draw examined and not examined surface from above."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    figure, axes = canvas(height_in=3.1)
+    figure, axes = canvas(height_in=map_height_in(cscan.mesh.vertices, 4.4, extra_in=1.0), width_in=4.4)
     mesh = cscan.mesh
     examined = cscan.covered[mesh.faces].all(axis=1)
     axes.tripcolor(
@@ -45,11 +52,11 @@ def coverage_figure(cscan: CScan, theme: Theme) -> Figure:  # noqa: ARG001 - eve
         vmax=1,
         rasterized=True,
     )
-    share = examined_share(cscan)
+    examined_text, rest_text = share_texts(examined_share(cscan))
     patches = [
-        Patch(color="#2f8f83", label=f"examined: {100 * share:.1f} %"),
-        Patch(color="#c8562a", label=f"not examined: {100 * (1 - share):.1f} %"),
+        Patch(color="#2f8f83", label=f"examined: {examined_text}"),
+        Patch(color="#c8562a", label=f"not examined: {rest_text}"),
     ]
     map_axes(axes, "Examined surface, from above")
-    axes.legend(handles=patches, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    axes.legend(handles=patches, loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2)
     return figure

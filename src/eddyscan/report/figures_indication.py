@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eddyscan.core.frames import Array, BoolArray
+from eddyscan.core.frames import Array, BoolArray, ComplexArray
 from eddyscan.core.indication import Indication
 from eddyscan.report.content import ReportContent
+from eddyscan.report.figures_signal import median_ohm
 from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes
 
 if TYPE_CHECKING:
@@ -25,61 +26,70 @@ def neighbourhood(positions_mm: Array, indication: Indication, pitch_mm: float) 
 
 
 def indication_figure(content: ReportContent, indication: Indication, theme: Theme) -> Figure:
-    """Draw the residual around an indication, its trace in the impedance plane, and the row through it."""
+    """Draw the signal around an indication, its trace in the impedance plane, and the row through it."""
     assert content.record is not None
-    record = content.record
+    record, part = content.record, content.record.part_mm
     figure, (picture, plane, strip) = canvas(height_in=2.7, columns=3)
-    near = neighbourhood(record.part_mm, indication, content.technique.plan.pitch_mm)
+    near = neighbourhood(part, indication, content.technique.plan.pitch_mm)
+    middle = near & (record.row == record.row[_nearest(part, indication)])
     signal = record.impedance_ohm if content.residual_ohm is None else content.residual_ohm
-    signal = 1000 * (signal - (np.nanmedian(signal.real) + 1j * np.nanmedian(signal.imag)))
-    part = record.part_mm
-    spread = 1500.0 / max(int(near.sum()), 1)
+    signal = 1000 * (signal - median_ohm(signal))
     drawn = picture.scatter(
-        part[near, 0],
-        part[near, 1],
-        c=np.abs(signal[near]),
-        s=np.clip(spread, 4, 90),
-        marker="s",
-        lw=0,
-        rasterized=True,
+        part[near, 0], part[near, 1], c=np.abs(signal[near]), s=_marker_size(near), marker="s", lw=0, rasterized=True
     )
     picture.plot(*indication.centre_mm[:2], "+", color=theme.alarm, ms=11, mew=1.3)
     colour_bar(figure, drawn, picture, "|signal| [mΩ]", theme)
-    map_axes(picture, "C-scan around it")
-    _trace(content, indication, near, plane, theme)
-    row = record.row == record.row[_nearest(part, indication)]
-    along = part[row & near]
-    travelled = np.linalg.norm(along - along[0], axis=1) if len(along) else np.zeros(0)
-    strip.plot(travelled, signal.real[row & near], color=theme.accent, lw=1.2, label="R")
-    strip.plot(travelled, signal.imag[row & near], color=theme.second, lw=1.2, label="X")
-    strip.set_title("Nearest row")
-    strip.set_xlabel("along the row [mm]")
-    strip.set_ylabel("change [mΩ]")
-    strip.legend(loc="best")
+    map_axes(picture, f"Indication {indication.number}: C-scan")
+    _trace(content, near, middle, plane, theme)
+    _strip(part[middle], signal[middle], strip, theme)
     return figure
+
+
+def _marker_size(near: BoolArray) -> float:
+    return float(np.clip(9000.0 / max(int(near.sum()), 1), 4, 130))
 
 
 def _nearest(positions_mm: Array, indication: Indication) -> int:
     return int(np.linalg.norm(positions_mm - np.asarray(indication.centre_mm), axis=1).argmin())
 
 
-def _trace(content: ReportContent, indication: Indication, near: BoolArray, axes: Axes, theme: Theme) -> None:
-    """Draw the raw readings of the neighbourhood, row by row, in the impedance plane."""
+def lift_off_rotation(impedance_ohm: ComplexArray, lift_off_mm: Array | None) -> complex:
+    """Return the unit factor that turns growing lift-off to the left, as analysts read the plane.
+
+    The direction is the regression slope of impedance over lift-off; 1 (no
+    rotation) without lift-off values that vary.
+    """
+    if lift_off_mm is None:
+        return 1.0
+    known = np.isfinite(lift_off_mm) & np.isfinite(impedance_ohm)
+    h = lift_off_mm[known] - (lift_off_mm[known].mean() if known.any() else 0.0)
+    slope = complex((impedance_ohm[known] * h).sum())
+    return -np.conj(slope) / abs(slope) if abs(slope) > 0 else 1.0
+
+
+def _trace(content: ReportContent, near: BoolArray, middle: BoolArray, axes: Axes, theme: Theme) -> None:
+    """Draw the raw readings of the neighbourhood, row by row, in the turned impedance plane."""
     assert content.record is not None
     record = content.record
-    z = 1000 * (record.impedance_ohm - np.nanmedian(record.impedance_ohm[near]) if near.any() else record.impedance_ohm)
-    middle = record.row[_nearest(record.part_mm, indication)]
-    for row in np.unique(record.row[near]):
+    turn = lift_off_rotation(record.impedance_ohm, content.lift_off_mm)
+    z = turn * record.impedance_ohm
+    z = 1000 * (z - median_ohm(z[near]))
+    for row in np.unique(record.row[near & ~middle]):
         chosen = near & (record.row == row)
-        mid = row == middle
-        axes.plot(
-            z.real[chosen],
-            z.imag[chosen],
-            "-",
-            color=theme.second if mid else theme.muted,
-            lw=1.4 if mid else 0.5,
-            alpha=1.0 if mid else 0.6,
-        )
-    axes.set_title("Impedance plane")
-    axes.set_xlabel("resistance change [mΩ]")
-    axes.set_ylabel("reactance change [mΩ]")
+        axes.plot(z.real[chosen], z.imag[chosen], color=theme.muted, lw=0.5, alpha=0.6)
+    axes.plot(z.real[middle], z.imag[middle], color=theme.second, lw=1.4)
+    axes.set_title("Impedance plane" if turn == 1.0 else f"Impedance plane, turned {np.degrees(np.angle(turn)):.0f}°")
+    axes.set_xlabel("resistance change [mΩ]" if turn == 1.0 else "lift-off runs to the left [mΩ]")
+    axes.set_ylabel("reactance change [mΩ]" if turn == 1.0 else "across lift-off [mΩ]")
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def _strip(part_mm: Array, signal_mohm: ComplexArray, axes: Axes, theme: Theme) -> None:
+    """Draw both components of the signal along the nearest row."""
+    travelled = np.linalg.norm(part_mm - part_mm[:1], axis=1)
+    axes.plot(travelled, signal_mohm.real, color=theme.accent, lw=1.2, label="R")
+    axes.plot(travelled, signal_mohm.imag, color=theme.second, lw=1.2, label="X")
+    axes.set_title("Nearest row")
+    axes.set_xlabel("along the row [mm]")
+    axes.set_ylabel("change [mΩ]")
+    axes.legend(loc="best")

@@ -8,7 +8,7 @@ import numpy as np
 
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.plan import ScanPlan
-from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes
+from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes, map_height_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,18 +17,9 @@ if TYPE_CHECKING:
 
 def path_figure(plan: ScanPlan, mesh: SurfaceMesh | None, theme: Theme) -> Figure:
     """Draw the path from above: rows, links, start and end, and the uncovered spots."""
-    figure, axes = canvas(height_in=3.9)
+    figure, axes = canvas(height_in=map_height_in(plan.surface_mm, 9.0, extra_in=1.0))
     if mesh is not None:
-        axes.tripcolor(
-            mesh.vertices[:, 0],
-            mesh.vertices[:, 1],
-            mesh.faces,
-            mesh.vertices[:, 2],
-            cmap="Greys_r",
-            alpha=0.25,
-            shading="gouraud",
-            rasterized=True,
-        )
+        _contours(axes, mesh, theme)
     spots = plan.surface_mm
     scan = plan.is_scan
     axes.plot(
@@ -56,8 +47,15 @@ def path_figure(plan: ScanPlan, mesh: SurfaceMesh | None, theme: Theme) -> Figur
     _mark_uncovered(axes, plan, theme)
     colour_bar(figure, drawn, axes, "visiting order", theme)
     map_axes(axes, "The path from above")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3)
     return figure
+
+
+def _contours(axes: Axes, mesh: SurfaceMesh, theme: Theme) -> None:
+    """Draw the surface's form as lines of equal height, behind everything else."""
+    x, y, z = mesh.vertices.T
+    if float(np.ptp(z)) > 0.1:
+        axes.tricontour(x, y, mesh.faces, z, levels=10, colors=theme.muted, linewidths=0.5, alpha=0.55, zorder=0.5)
 
 
 def _mark_uncovered(axes: Axes, plan: ScanPlan, theme: Theme) -> None:
@@ -93,7 +91,7 @@ def predicted_figure(plan: ScanPlan, target_mm: float, theme: Theme) -> Figure:
     lift.axhline(target_mm, color=theme.accent, lw=1, ls="--", label=f"asked for: {target_mm:g} mm")
     lift.set_ylabel("lift-off [mm]")
     lift.set_title("Predicted lift-off and tilt of every reading (vertical lines part the rows)")
-    lift.legend(loc="upper right")
+    lift.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
     tilt.plot(order, plan.tilt_deg[scan], color=theme.second, lw=1)
     tilt.set_ylabel("tilt [°]")
     tilt.set_xlabel("reading, in visiting order")

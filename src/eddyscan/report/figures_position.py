@@ -88,7 +88,7 @@ def error_figure(record: ScanRecord, theme: Theme) -> Figure:
         values = 1000 * (record.stage_mm - record.target_mm)[:, AXES.index(error.axis)]
         panel.hist(values[np.isfinite(values)], bins=40, color=theme.accent, lw=0)
         panel.axvline(error.mean_um, color=theme.second, lw=1.2)
-        panel.set_title(f"{error.axis}: {error.mean_um:+.2f} ± {error.std_um:.2f} µm")
+        panel.set_title(f"{error.axis}: {error.mean_um:+.2f} ± {error.std_um:.2f} µm".replace("-", "−"))
         panel.set_xlabel("recorded − planned [µm]")
     axes[0].set_ylabel("readings")
     return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,19 +10,28 @@ from eddyscan.core.cscan import CScan
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.core.record import ScanRecord
 from eddyscan.report.figures_plan import point_size
-from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes
+from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes, map_height_in
 from eddyscan.report.words import label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+CRACK_CHANNELS = ("residual", "score")
+
+
+def median_ohm(impedance_ohm: ComplexArray) -> complex:
+    """Return the median of either component over the readings that have a value; 0 without any."""
+    known = impedance_ohm[np.isfinite(impedance_ohm)]
+    return complex(np.median(known.real), np.median(known.imag)) if known.size else 0j
+
+
 def reading_maps(record: ScanRecord, residual_ohm: ComplexArray | None, lift_off_mm: Array | None) -> dict[str, Array]:
     """Return what each reading tells as title with unit -> (N,) values."""
-    z = record.impedance_ohm
+    change_mohm = 1000 * (record.impedance_ohm - median_ohm(record.impedance_ohm))
     maps = {
-        "resistance, change from its median [mΩ]": 1000 * (z.real - np.nanmedian(z.real)),
-        "reactance, change from its median [mΩ]": 1000 * (z.imag - np.nanmedian(z.imag)),
+        "resistance, change from its median [mΩ]": change_mohm.real,
+        "reactance, change from its median [mΩ]": change_mohm.imag,
     }
     if lift_off_mm is not None:
         maps["lift-off told by the probe [mm]"] = lift_off_mm
@@ -33,11 +42,10 @@ def reading_maps(record: ScanRecord, residual_ohm: ComplexArray | None, lift_off
 
 def readings_figure(record: ScanRecord, maps: dict[str, Array], theme: Theme) -> Figure:
     """Draw every reading where it was taken, one map per channel, raw."""
-    figure, panels = canvas(height_in=2.5 * ((len(maps) + 1) // 2), rows=(len(maps) + 1) // 2, columns=2, squeeze=False)
-    part = record.part_mm
+    part, rows = record.part_mm, (len(maps) + 1) // 2
+    figure, panels = canvas(height_in=map_height_in(part, 4.5) * rows, rows=rows, columns=2, squeeze=False)
     for panel, (title, values) in zip(panels.flat, maps.items(), strict=False):
         known = np.isfinite(values)
-        low, high = np.percentile(values[known], (0.5, 99.5)) if known.any() else (0.0, 1.0)
         drawn = panel.scatter(
             part[known, 0],
             part[known, 1],
@@ -45,8 +53,7 @@ def readings_figure(record: ScanRecord, maps: dict[str, Array], theme: Theme) ->
             s=point_size(len(values)),
             marker="s",
             lw=0,
-            vmin=low,
-            vmax=max(high, low + 1e-12),
+            norm=_scale(title, values),
             cmap=_colours(title),
             rasterized=len(values) > 500,
         )
@@ -61,25 +68,38 @@ def _colours(title: str) -> str:
     return "cividis" if "lift" in title else "viridis"
 
 
+def _scale(title: str, values: Array) -> Any:
+    """Return the colour scale: the crack channels show their whole range, the others what 99 % of readings hold."""
+    from matplotlib.colors import Normalize, PowerNorm
+
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return Normalize(0.0, 1.0)
+    if any(word in title for word in CRACK_CHANNELS):
+        return PowerNorm(0.5, max(float(known.min()), 0.0), max(float(known.max()), 1e-12))
+    low, high = np.percentile(known, (0.5, 99.5))
+    return Normalize(float(low), max(float(high), float(low) + 1e-12))
+
+
 def cscan_figure(cscan: CScan, names: list[str], theme: Theme) -> Figure:
     """Draw C-scan channels on the surface, seen from above; nothing where no reading speaks for the spot."""
     rows = (len(names) + 1) // 2
-    figure, panels = canvas(height_in=2.5 * rows, rows=rows, columns=2, squeeze=False)
+    figure, panels = canvas(
+        height_in=map_height_in(cscan.mesh.vertices, 4.5) * rows, rows=rows, columns=2, squeeze=False
+    )
     mesh = cscan.mesh
     for panel, name in zip(panels.flat, names, strict=False):
         values = cscan.channels[name]
         known = np.isfinite(values) & cscan.covered
         faces = mesh.faces[known[mesh.faces].all(axis=1)]
         if len(faces):
-            low, high = np.percentile(values[known], (0.5, 99.5))
             drawn = panel.tripcolor(
                 mesh.vertices[:, 0],
                 mesh.vertices[:, 1],
                 faces,
-                np.where(known, values, low),
+                np.where(known, values, 0.0),
                 shading="gouraud",
-                vmin=low,
-                vmax=max(high, low + 1e-12),
+                norm=_scale(name, values[known]),
                 cmap=_colours(name),
                 rasterized=True,
             )

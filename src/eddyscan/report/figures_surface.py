@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eddyscan.core.frames import Array, apply
+from eddyscan.core.frames import Array, IntArray, apply
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.report.content import NominalComparison
-from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes
+from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes, map_height_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +20,11 @@ BINS = 100
 
 @dataclass(frozen=True)
 class Profile:
-    """Heights along x, averaged over y: (K,) arrays in mm; NaN where a strip holds no vertex."""
+    """Heights along x, averaged over y in strips that hold a vertex: (K,) arrays in mm.
+
+    The spread is the standard deviation across y of what the nominal (or, without
+    one, the mean line) leaves over, so a slope does not count as spread.
+    """
 
     x_mm: Array
     measured_mm: Array
@@ -37,13 +41,18 @@ def profile(mesh: SurfaceMesh, nominal: NominalComparison | None) -> Profile:
     if len(points) == 0:
         return Profile(*(np.array([np.nan]) for _ in range(4)))
     edges = np.linspace(points[:, 0].min(), points[:, 0].max() + 1e-9, BINS + 1)
-    strip = np.clip(np.digitize(points[:, 0], edges) - 1, 0, BINS - 1)
-    count = np.bincount(strip, minlength=BINS)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.bincount(strip, points[:, 2], BINS) / count
-        square = np.bincount(strip, (points[:, 2] - mean[strip]) ** 2, BINS) / count
-        expected_mean = np.bincount(strip, expected, BINS) / count
-    return Profile((edges[:-1] + edges[1:]) / 2, mean, np.sqrt(square), expected_mean)
+    strip = np.digitize(points[:, 0], edges) - 1
+    _, strip = np.unique(strip, return_inverse=True)
+    x_mm, z_mm, nominal_mm = (_mean(values, strip) for values in (points[:, 0], points[:, 2], expected))
+    along = expected if nominal is not None else np.interp(points[:, 0], x_mm, z_mm)
+    off = points[:, 2] - along
+    spread = np.sqrt(_mean((off - _mean(off, strip)[strip]) ** 2, strip))
+    return Profile(x_mm, z_mm, spread, nominal_mm)
+
+
+def _mean(values: Array, group: IntArray) -> Array:
+    """Return the mean of each group (K,); groups are numbered 0 to K - 1 without gaps."""
+    return np.asarray(np.bincount(group, values) / np.bincount(group))
 
 
 def heights(surface: SurfaceMesh, xy_mm: Array) -> Array:
@@ -117,7 +126,7 @@ def deviation_figure(mesh: SurfaceMesh, signed_mm: Array, theme: Theme) -> Figur
 def uncertainty_figure(mesh: SurfaceMesh, theme: Theme) -> Figure:
     """Draw the stated standard uncertainty of the surface over the part."""
     assert mesh.uncertainty_mm is not None
-    figure, plan = canvas(height_in=3.1)
+    figure, plan = canvas(height_in=map_height_in(mesh.vertices, 4.4), width_in=4.4)
     drawn = plan.tripcolor(
         mesh.vertices[:, 0],
         mesh.vertices[:, 1],
@@ -128,5 +137,5 @@ def uncertainty_figure(mesh: SurfaceMesh, theme: Theme) -> Figure:
         rasterized=True,
     )
     colour_bar(figure, drawn, plan, "standard uncertainty [µm]", theme)
-    map_axes(plan, "Stated uncertainty of the surface, along its normal")
+    map_axes(plan, "Stated uncertainty along the normal")
     return figure

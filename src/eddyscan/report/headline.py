@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from eddyscan.report.content import ReportContent
-from eddyscan.report.figures_coverage import examined_share
+from eddyscan.report.figures_coverage import examined_share, share_texts
 from eddyscan.report.words import MISSING, percent
 
 
@@ -66,7 +66,9 @@ def _planned(content: ReportContent) -> Tile:
 def _examined(content: ReportContent) -> Tile:
     if content.cscan is None:
         return Tile("examined surface", MISSING, "no C-scan")
-    return Tile("examined surface", percent(examined_share(content.cscan)), "of the whole surface, edges included")
+    return Tile(
+        "examined surface", share_texts(examined_share(content.cscan))[0], "of the whole surface, edges included"
+    )
 
 
 def _lift_off(content: ReportContent) -> Tile:

@@ -11,11 +11,13 @@ import numpy as np
 from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.report.content import ReportContent
+from eddyscan.report.figures_signal import CRACK_CHANNELS
 from eddyscan.report.mesh_thinning import thinned
 from eddyscan.report.words import label
 
 MOST_VERTICES = 20_000
 MOST_PATH_POINTS = 20_000
+GREY, GREY_SHARE = "#8a949d", 0.02
 
 
 def typed(values: Array | IntArray) -> dict[str, str]:
@@ -34,12 +36,13 @@ def scene_json(content: ReportContent) -> str:
     layers = {name: values[keep] for name, values in _layers(content, mesh).items()}
     traces = [_surface(mesh, keep, faces, layers), *_path(content), *_indications(content)]
     layout = {
-        "scene": {"aspectmode": "data", "camera": {"eye": {"x": -0.9, "y": -1.5, "z": 1.1}}, **_scene_axes()},
+        "scene": {"aspectmode": "data", "camera": {"eye": {"x": -0.75, "y": -1.9, "z": 1.25}}, **_scene_axes()},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "height": 520,
         "showlegend": True,
         "legend": {"orientation": "h", "y": 0.02, "x": 0.01},
         "paper_bgcolor": "rgba(0,0,0,0)",
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "orientation": "v"},
         "updatemenus": [_menu(layers)] if len(layers) > 1 else [],
     }
     return json.dumps({"data": traces, "layout": layout})
@@ -67,17 +70,26 @@ def _layers(content: ReportContent, mesh: SurfaceMesh) -> dict[str, Array]:
     return layers
 
 
-def _limits(values: Array) -> tuple[float, float]:
-    known = values[np.isfinite(values)]
-    if known.size == 0:
-        return 0.0, 1.0
-    low, high = np.percentile(known, (0.5, 99.5))
-    return float(low), float(max(high, low + 1e-9))
+def _colouring(name: str, values: Array) -> dict[str, Any]:
+    """Return intensity, limits and scale of one layer; spots without value take the grey foot of the scale."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    known = np.isfinite(values)
+    crack = any(word in name for word in CRACK_CHANNELS)
+    low, high = np.percentile(values[known], (0.0, 100.0) if crack else (0.5, 99.5)) if known.any() else (0.0, 1.0)
+    high = max(float(high), float(low) + 1e-9)
+    foot = float(low) - GREY_SHARE * (high - float(low))
+    steps = np.linspace(0, 1, 17)
+    places = GREY_SHARE + (1 - GREY_SHARE) * (steps**2 if crack else steps)
+    scale = [[0.0, GREY], [GREY_SHARE / 2, GREY], [GREY_SHARE / 2, to_hex(colormaps["viridis"](0.0))]]
+    scale += [[float(p), to_hex(colormaps["viridis"](s))] for p, s in zip(places, steps, strict=True)]
+    shown = np.where(known, np.clip(values, low, None), foot)
+    return {"intensity": typed(shown), "cmin": foot, "cmax": high, "colorscale": scale}
 
 
 def _surface(mesh: SurfaceMesh, keep: IntArray, faces: IntArray, layers: dict[str, Array]) -> dict[str, Any]:
     name, values = next(iter(layers.items()))
-    low, high = _limits(values)
     axes = {axis: typed(mesh.vertices[keep, k]) for k, axis in enumerate("xyz")}
     corners = {corner: typed(faces[:, k]) for k, corner in enumerate("ijk")}
     return {
@@ -85,10 +97,7 @@ def _surface(mesh: SurfaceMesh, keep: IntArray, faces: IntArray, layers: dict[st
         "name": "surface",
         **axes,
         **corners,
-        "intensity": typed(values),
-        "cmin": low,
-        "cmax": high,
-        "colorscale": "Viridis",
+        **_colouring(name, values),
         "colorbar": {"title": {"text": name}, "thickness": 12, "len": 0.7, "outlinewidth": 0},
         "lighting": {"ambient": 0.65, "diffuse": 0.6, "specular": 0.05, "roughness": 0.9},
         "hovertemplate": "x %{x:.2f} · y %{y:.2f} · z %{z:.2f} mm<br>%{intensity:.4g}<extra></extra>",
@@ -99,8 +108,8 @@ def _surface(mesh: SurfaceMesh, keep: IntArray, faces: IntArray, layers: dict[st
 def _menu(layers: dict[str, Array]) -> dict[str, Any]:
     buttons = []
     for name, values in layers.items():
-        low, high = _limits(values)
-        change = {"intensity": [typed(values)], "cmin": low, "cmax": high, "colorbar.title.text": name}
+        colouring = {key: [value] for key, value in _colouring(name, values).items()}
+        change = {**colouring, "colorbar.title.text": name}
         buttons.append({"label": name, "method": "restyle", "args": [change, [0]]})
     return {"buttons": buttons, "x": 0.01, "y": 0.99, "xanchor": "left", "yanchor": "top", "pad": {"t": 4, "l": 4}}
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from eddyscan.report.blocks import Block, Facts, Note, Section
+from typing import Any
+
+from eddyscan.report.blocks import Block, Note, Section
 from eddyscan.report.content import ReportContent
-from eddyscan.report.tables import as_entries, settings_facts, table_of
+from eddyscan.report.tables import as_entries, facts_of, settings_facts, table_of
+
+DEVICES = ("stage", "instrument", "camera")
 
 
 def result(content: ReportContent) -> Section:
@@ -43,12 +47,7 @@ def equipment(content: ReportContent) -> Section:
     """Name the devices and the settings, as the technique fixes them and as they were applied."""
     technique = content.technique
     meta = {} if content.record is None else content.record.meta
-    blocks: list[Block] = []
-    devices = as_entries(meta.get("devices"))
-    if devices:
-        blocks.append(table_of([_flat(device) for device in devices], "Devices as they identified themselves"))
-    else:
-        blocks.append(Note("No device identities: nothing was scanned, or the record holds none.", "missing"))
+    blocks: list[Block] = [*_devices(meta)]
     blocks += [
         settings_facts(technique.probe, "Probe"),
         settings_facts(technique.drive, "Operating point"),
@@ -56,21 +55,34 @@ def equipment(content: ReportContent) -> Section:
         settings_facts(technique.scan, "Motion and reading"),
         settings_facts(technique.analysis, "Analysis"),
     ]
-    applied = meta.get("settings")
-    if isinstance(applied, dict) and "probe" not in applied:
-        blocks.append(_applied(applied))
+    if isinstance(meta.get("settings"), dict):
+        blocks.append(facts_of(meta["settings"], "As applied by the devices"))
     return Section("equipment", "Equipment and settings", "", tuple(blocks))
 
 
-def _flat(device: dict[str, object]) -> dict[str, object]:
-    """Drop a device's long settings list and say in words whether it was verified on hardware."""
-    kept = {key: value for key, value in device.items() if key not in ("settings", "name")}
-    if "verified" in kept:
-        kept["verified"] = "verified" if kept["verified"] else "unverified on hardware"
+def _devices(meta: dict[str, Any]) -> list[Block]:
+    """Return the tables of devices and axes a record names."""
+    entries = as_entries(meta.get("devices"))
+    entries += [meta[kind] for kind in DEVICES if isinstance(meta.get(kind), dict)]
+    if not entries:
+        return [Note("No device identities: nothing was scanned, or the record holds none.", "missing")]
+    blocks: list[Block] = [table_of([_identity(entry) for entry in entries], "Devices as they identified themselves")]
+    axes = as_entries(meta.get("axes"))
+    if axes:
+        blocks.append(table_of([_axis(axis) for axis in axes], "Axes as they reported themselves"))
+    return blocks
+
+
+def _identity(device: dict[str, Any]) -> dict[str, Any]:
+    """Keep who it is, and say in words whether the driver was ever run on hardware."""
+    kept = {key: value for key, value in device.items() if key not in ("settings", "name", "verified")}
+    if "verified" in device:
+        kept["driver"] = "verified on hardware" if device["verified"] else "not verified on hardware"
     return kept
 
 
-def _applied(applied: dict[str, object]) -> Facts:
-    from eddyscan.report.tables import facts_of
-
-    return facts_of(applied, "As applied by the devices")
+def _axis(axis: dict[str, Any]) -> dict[str, Any]:
+    """Put the unit of an axis into the names of its values."""
+    unit = str(axis.get("unit", "mm"))
+    named = {"lower": unit, "upper": unit, "resolution": unit, "max_speed": f"{unit}/s", "acceleration": f"{unit}/s²"}
+    return {f"{key} [{named[key]}]" if key in named else key: value for key, value in axis.items() if key != "unit"}

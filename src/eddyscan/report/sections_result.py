@@ -9,9 +9,9 @@ import numpy as np
 
 from eddyscan.core.indication import Indication
 from eddyscan.core.plan import Uncovered
-from eddyscan.report.blocks import Block, Chart, Note, Section, Table
+from eddyscan.report.blocks import Block, Chart, Facts, Note, Section, Table
 from eddyscan.report.content import ReportContent
-from eddyscan.report.figures_coverage import coverage_figure, examined_share
+from eddyscan.report.figures_coverage import coverage_figure, examined_share, share_texts
 from eddyscan.report.figures_indication import indication_figure
 from eddyscan.report.figures_signal import (
     cscan_figure,
@@ -54,7 +54,7 @@ def signals(content: ReportContent) -> Section:
     blocks.append(Chart(partial(plane_figure, record, content.lift_off_mm), "Raw impedance, unrotated.", half=True))
     blocks.append(Chart(partial(strip_figure, record, content.residual_ohm), "Raw signals over time."))
     if content.statistics:
-        blocks.append(facts_of(content.statistics, "Statistics of the analysis"))
+        blocks.append(facts_of(content.statistics, "Statistics of the analysis", wide=True))
     return Section("signals", "Signals and maps", lead, tuple(blocks))
 
 
@@ -62,10 +62,9 @@ def coverage(content: ReportContent) -> Section:
     """Show what was examined, and list what was not and why."""
     blocks: list[Block] = []
     if content.cscan is not None:
-        share = examined_share(content.cscan)
         limit = content.technique.analysis.lift_off_max_mm
-        text = f"A reading within {limit:g} mm lift-off speaks for {percent(share)} of the whole surface."
-        blocks.append(Chart(partial(coverage_figure, content.cscan), text))
+        text = f"Examined: a reading within {limit:g} mm lift-off speaks for the spot."
+        blocks += [Chart(partial(coverage_figure, content.cscan), text, half=True), _examined_facts(content)]
     else:
         blocks.append(Note("No C-scan, so nothing can be called examined.", "missing"))
     planned = () if content.plan is None else content.plan.coverage.uncovered
@@ -74,9 +73,22 @@ def coverage(content: ReportContent) -> Section:
         blocks.append(_uncovered_table(left_out))
     elif content.plan is not None:
         blocks.append(Note("The plan leaves out nothing inside the margin.", "good"))
-    margin = content.technique.plan.margin_mm
-    blocks.append(Note(f"A rim of {margin:g} mm along the edge is outside the region by the technique.", "plain"))
     return Section("coverage", "Examined, and what was not covered", "", tuple(blocks))
+
+
+def _examined_facts(content: ReportContent) -> Facts:
+    assert content.cscan is not None
+    share, area = examined_share(content.cscan), content.cscan.mesh.area_mm2 / 100
+    examined, rest = share_texts(share)
+    rows = [
+        ("whole surface", f"{area:.1f} cm²"),
+        ("examined", f"{examined}, {share * area:.1f} cm²"),
+        ("not examined", f"{rest}, {(1 - share) * area:.1f} cm²"),
+    ]
+    if content.plan is not None:
+        rows.append(("planned, inside the margin", percent(content.plan.coverage.swept)))
+    rows.append(("margin left at the edge", f"{content.technique.plan.margin_mm:g} mm by the technique"))
+    return Facts(tuple(rows), "Coverage")
 
 
 def _uncovered_table(left_out: Sequence[tuple[str, Uncovered]]) -> Table:
@@ -101,7 +113,10 @@ def indications(content: ReportContent) -> Section:
     if content.record is not None and len(content.record):
         for one in content.indications:
             x, y, z = one.centre_mm
-            caption = f"Indication {one.number} at x {x:.1f}, y {y:.1f}, z {z:.1f} mm."
+            caption = (
+                f"Indication {one.number} at x {x:.1f}, y {y:.1f}, z {z:.1f} mm. The middle row is drawn strong in the "
+                "impedance plane; amplitudes and phases in the table stay unrotated."
+            )
             blocks.append(Chart(partial(indication_figure, content, one), caption))
     return Section("indications", title, lead, tuple(blocks))
 

@@ -22,7 +22,7 @@ def plan(content: ReportContent) -> Section:
     blocks: list[Block] = [
         Chart(partial(path_figure, planned, content.mesh), "The path from above, coloured in visiting order."),
         _coverage_facts(planned.coverage),
-        _pose_table(planned),
+        _pose_facts(planned),
         Chart(partial(predicted_figure, planned, target), "What the plan predicts for every reading."),
     ]
     if planned.notes:
@@ -52,12 +52,18 @@ def _triple(values: tuple[float, float, float]) -> str:
     return " / ".join(f"{value:.3f}" for value in values) + " mm"
 
 
-def _pose_table(planned: ScanPlan) -> Table:
+def _pose_facts(planned: ScanPlan) -> Facts:
     scan = planned.is_scan
     rows = []
-    for name, values in (("lift-off [mm]", planned.lift_off_mm[scan]), ("tilt [°]", planned.tilt_deg[scan])):
-        rows.append((name, *(number(float(v)) for v in (values.min(), values.mean(), values.max(), values.std()))))
-    return Table(("predicted", "least", "mean", "largest", "standard deviation"), tuple(rows), "Predicted per reading")
+    for name, unit, values in (
+        ("lift-off", "mm", planned.lift_off_mm[scan]),
+        ("tilt", "°", planned.tilt_deg[scan]),
+        ("speed", "mm/s", planned.speed_mm_s[scan]),
+    ):
+        texts = " / ".join(number(float(v), 3) for v in (values.min(), values.mean(), values.max()))
+        rows.append((f"{name}, least / mean / largest", f"{texts} {unit}"))
+    rows.append(("lift-off, standard deviation", f"{1000 * planned.lift_off_mm[scan].std():.1f} µm"))
+    return Facts(tuple(rows), "Predicted for the readings")
 
 
 def positions(content: ReportContent) -> Section:
@@ -68,7 +74,13 @@ def positions(content: ReportContent) -> Section:
     record = content.record
     errors = axis_errors(record)
     rows = tuple(
-        (f"{e.axis} stage", str(e.readings), f"{e.mean_um:+.3f}", f"{e.std_um:.3f}", f"{e.largest_um:.3f}")
+        (
+            f"{e.axis} stage",
+            str(e.readings),
+            f"{e.mean_um:+.3f}".replace("-", "−"),
+            f"{e.std_um:.3f}",
+            f"{e.largest_um:.3f}",
+        )
         for e in errors
     )
     columns = ("axis", "readings", "mean error [µm]", "standard deviation [µm]", "largest [µm]")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
+
 from eddyscan.core.frames import Array
 from eddyscan.core.mesh import SurfaceMesh
-from eddyscan.report.blocks import Block, Chart, Gallery, Note, Scene, Section, Table
+from eddyscan.report.blocks import Block, Chart, Facts, Gallery, Note, Scene, Section, Table
 from eddyscan.report.content import NominalComparison, ReportContent
 from eddyscan.report.figures_still import still_figure
 from eddyscan.report.figures_surface import deviation_figure, profile_figure, uncertainty_figure
@@ -52,13 +54,22 @@ def surface(content: ReportContent) -> Section:
         f"{len(mesh.vertices)} vertices, {len(mesh.faces)} triangles. Drag to turn, scroll to zoom."
     )
     still = Chart(partial(still_figure, content), "The surface seen from the front, with the planned path.")
-    caption = (
-        "Measured surface with the planned path. The menu changes what the colour shows; grey or empty: not covered."
-    )
+    caption = "Measured surface with the planned path. The menu changes what the colour shows; grey: not covered."
     blocks: list[Block] = [Scene(scene_json(content), caption, still)]
     if mesh.uncertainty_mm is not None:
-        blocks.append(Chart(partial(uncertainty_figure, mesh), "How well each spot of the surface is known."))
+        blocks.append(
+            Chart(partial(uncertainty_figure, mesh), "How well each spot of the surface is known.", half=True)
+        )
+        blocks.append(_uncertainty_facts(mesh.uncertainty_mm))
     return Section("surface", "Surface, path and C-scan", lead, tuple(blocks))
+
+
+def _uncertainty_facts(uncertainty_mm: Array) -> Facts:
+    known = 1000 * uncertainty_mm[np.isfinite(uncertainty_mm)]
+    if known.size == 0:
+        return Facts((("stated for", "no vertex"),), "Uncertainty of the surface")
+    rows = [(f"{share} % of the vertices below", f"{np.percentile(known, share):.0f} µm") for share in (50, 90, 99)]
+    return Facts((*rows, ("largest", f"{known.max():.0f} µm")), "Standard uncertainty along the normal")
 
 
 def nominal(content: ReportContent) -> Section | None:
@@ -90,4 +101,4 @@ def _deviation_facts(comparison: NominalComparison) -> Block:
     plain = {key: value for key, value in comparison.deviation.items() if not key.startswith("T_")}
     if not plain:
         return Note("The comparison holds no statistics.", "missing")
-    return facts_of(plain, f"Deviation from {comparison.name}")
+    return facts_of(plain, f"Deviation from {comparison.name}", wide=True)

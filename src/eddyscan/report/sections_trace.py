@@ -13,7 +13,9 @@ def truth(content: ReportContent) -> Section | None:
     if content.truth is None:
         return None
     warning = "Known only because this was a simulation. No step of the inspection saw these values."
-    return Section("truth", "Against the hidden truth", "", (Note(warning, "warning"), facts_of(content.truth)))
+    return Section(
+        "truth", "Against the hidden truth", "", (Note(warning, "warning"), facts_of(content.truth, wide=True))
+    )
 
 
 def provenance(content: ReportContent) -> Section:

@@ -10,9 +10,9 @@ from eddyscan.report.blocks import Facts, Table
 from eddyscan.report.words import flattened, label, value_text
 
 
-def facts_of(values: Mapping[str, Any], title: str = "") -> Facts:
+def facts_of(values: Mapping[str, Any], title: str = "", *, wide: bool = False) -> Facts:
     """Return nested plain values as names and texts."""
-    return Facts(tuple(flattened(values)), title)
+    return Facts(tuple(flattened(values)), title, wide)
 
 
 def settings_facts(settings: Settings, title: str) -> Facts:

@@ -7,6 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from eddyscan.core.frames import Array
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -72,7 +76,7 @@ def settings(theme: Theme) -> dict[str, Any]:
         "pdf.fonttype": 42,
         "image.cmap": "viridis",
         "figure.dpi": 110,
-        "savefig.dpi": 160,
+        "savefig.dpi": 120,
     }
 
 
@@ -100,6 +104,16 @@ def colour_bar(figure: Figure, drawn: Any, axes: Axes, title: str, theme: Theme)
     bar.outline.set_visible(False)
     bar.ax.tick_params(size=0, labelcolor=theme.muted, labelsize=8.5)
     bar.set_label(title, color=theme.muted)
+
+
+def map_height_in(points_mm: Array, width_in: float, *, extra_in: float = 0.75) -> float:
+    """Return the height at which a plan view fills `width_in` without empty sides.
+
+    points_mm : (N, >= 2) what the map shows; its bounding box sets the proportion.
+    """
+    size = np.ptp(points_mm[:, :2], axis=0)
+    across = width_in - 1.35  # axis labels and colour scale
+    return float(np.clip(across * size[1] / max(size[0], 1e-9) + extra_in, 1.6, 6.0))
 
 
 def map_axes(axes: Axes, title: str) -> None:

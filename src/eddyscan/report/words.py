@@ -60,9 +60,24 @@ def label(key: str) -> str:
     return spelled(key)
 
 
+WORDS = {
+    "rmse": "root mean square",
+    "rms": "root mean square",
+    "mad": "in robust standard deviations",
+    "p05": "5 % below",
+    "p50": "median",
+    "p95": "95 % below",
+    "p99": "99 % below",
+    "max": "largest",
+    "min": "least",
+    "std": "standard deviation",
+}
+
+
 def spelled(name: str) -> str:
     """Turn an identifier into words."""
-    return name.replace("lift_off", "lift-off").replace("_", " ").strip()
+    whole = name.replace("mean_abs", "mean absolute").replace("lift_off", "lift-off")
+    return " ".join(WORDS.get(word, word) for word in whole.split("_") if word)
 
 
 def value_text(value: Any) -> str:
