@@ -30,7 +30,7 @@ class KeysightE4980ASettings(Section):
     address: str = Field("TCPIP::192.168.0.10::5025::SOCKET", description="VISA resource name")
     aperture: Literal["SHORT", "MED", "LONG"] = "SHORT"
     averages: int = Field(1, ge=1, le=256)
-    timeout_s: float = Field(3.0, gt=0, le=120, description="wall time without answer: link lost, s")
+    timeout_s: float = Field(10.0, gt=0, le=120, description="wall time without answer: link lost, s")
 
 
 class KeysightE4980A:
