@@ -96,12 +96,15 @@ class Inspection:
         return sorted(p for p in folder.iterdir() if p.suffix.lower() in suffixes and "-infrared" not in p.name)
 
     @contextlib.contextmanager
-    def writing(self, step: str, inputs: Mapping[str, str]) -> Iterator[Path]:
-        """Yield a temporary folder that becomes the step's folder when the block ends well."""
+    def writing(self, step: str, inputs: Mapping[str, str], started: datetime | None = None) -> Iterator[Path]:
+        """Yield a temporary folder that becomes the step's folder when the block ends well.
+
+        `started` is when the step's work began; without it, now.
+        """
         target = self.step_folder(step)
         temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=self.folder))
         temporary.chmod(0o755)
-        started = datetime.now(UTC)
+        started = started or datetime.now(UTC)
         try:
             yield temporary
             write_step_note(temporary, inputs, started)

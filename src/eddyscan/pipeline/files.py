@@ -176,7 +176,8 @@ def nominal_of(name: str) -> NominalPart | SurfaceMesh:
         return PARTS[name]
     if not Path(name).is_file():
         raise InputError(f"{name} is neither a mesh file nor a known part; known are {', '.join(PARTS)}.")
-    return read_mesh(Path(name))
+    mesh: SurfaceMesh = read_mesh(Path(name))
+    return mesh
 
 
 def compare_meshes(mesh_file: Path, to: str, *, align: bool = False, progress: Progress = silent) -> dict[str, Any]:

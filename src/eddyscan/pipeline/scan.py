@@ -13,6 +13,7 @@ from eddyscan.core.progress import Progress
 from eddyscan.inspection import Inspection, read_json, sha256_of, write_json, write_step_note
 from eddyscan.pipeline.control import ScanControl, WatchedSink
 from eddyscan.pipeline.states import inputs_of
+from eddyscan.pipeline.truth import keep_truth_log
 
 if TYPE_CHECKING:
     from eddyscan.devices.rig import Rig
@@ -58,8 +59,8 @@ def scan_plan(
         )
     finally:
         sink.close()
-    if rig.cell is not None:
-        write_json(folder / "truth.json", rig.cell.truth_log())
+        if rig.cell is not None:
+            keep_truth_log(inspection, rig.cell.truth_log())
     write_step_note(folder, inputs, started)
 
 
@@ -71,10 +72,12 @@ def _set_stale_record_aside(inspection: Inspection, inputs: dict[str, str]) -> N
 
 def _alignment(inspection: Inspection, rig: Rig, *, keep: bool) -> Array:
     """Return T_stage_part: from an earlier start of this scan, rig.toml, or the operator's jog."""
+    from eddyscan.formats.meshes import read_mesh
+
     path = inspection.file("record", "alignment.json")
     if path.is_file():
         return checked_transform(read_json(path)["T_stage_part"], str(path))
-    T_stage_part, how = rig.alignment()
+    T_stage_part, how = rig.alignment(read_mesh(inspection.file("surface", "surface.ply")))
     if keep:
         write_json(path, {"T_stage_part": np.asarray(T_stage_part).tolist(), "how": how})
     return T_stage_part

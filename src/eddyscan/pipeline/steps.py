@@ -7,6 +7,7 @@ inputs' hashes.
 from __future__ import annotations
 
 from dataclasses import asdict
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,9 +32,10 @@ def take_views(inspection: Inspection, rig: Rig, progress: Progress) -> None:
     """Take views with the rig's camera into 1-views."""
     from eddyscan.formats.depth_images import write_depth_image
 
+    started = datetime.now(UTC)
     camera = rig.camera
     n_views = rig.settings.camera.views
-    with inspection.writing("views", inputs_of(inspection, "views")) as folder:
+    with inspection.writing("views", inputs_of(inspection, "views"), started) as folder:
         for number in range(n_views):
             progress("taking views", number, n_views)
             write_depth_image(camera.capture(), folder / f"view-{number}.png")
@@ -50,9 +52,9 @@ def make_surface(inspection: Inspection, progress: Progress, *, single_view: boo
         folder = inspection.step_folder("views")
         raise FileError(f"{folder} holds no views; put .ply, .pcd, .xyz, .e57 or depth .png with camera.json there.")
     technique = inspection.technique()
-    inputs = inputs_of(inspection, "surface")
+    started, inputs = datetime.now(UTC), inputs_of(inspection, "surface")
     result = reconstruct(read_views(files), technique.surface, single_view=single_view, progress=progress)
-    with inspection.writing("surface", inputs) as folder:
+    with inspection.writing("surface", inputs, started) as folder:
         write_surface(result, folder)
         figures = surface_summary(result)
         if technique.part.nominal is not None:
@@ -74,10 +76,10 @@ def make_plan(inspection: Inspection, rig_travel_mm: tuple[float, float, float] 
     from eddyscan.formats.plans import write_plan
     from eddyscan.planning import plan
 
-    inputs = inputs_of(inspection, "plan")
+    started, inputs = datetime.now(UTC), inputs_of(inspection, "plan")
     mesh = read_mesh(inspection.file("surface", "surface.ply"))
     result = plan(mesh, inspection.technique(), travel_mm=rig_travel_mm, inputs=inputs, progress=progress)
-    with inspection.writing("plan", inputs) as folder:
+    with inspection.writing("plan", inputs, started) as folder:
         write_plan(result, folder / "plan.json")
         write_plan(result, folder / "plan.csv")
         write_json(folder / "summary.json", plan_summary(result))
@@ -90,19 +92,13 @@ def analyse_record(inspection: Inspection, progress: Progress) -> None:
     from eddyscan.formats.record_ply import write_cscan_ply
     from eddyscan.formats.records import read_record
 
-    inputs = inputs_of(inspection, "cscan")
+    started, inputs = datetime.now(UTC), inputs_of(inspection, "cscan")
     mesh = read_mesh(inspection.file("surface", "surface.ply"))
     record = read_record(inspection.file("record", "record.sqlite"))
     result = analyse(record, mesh, inspection.technique(), progress=progress)
-    with inspection.writing("cscan", inputs) as folder:
+    with inspection.writing("cscan", inputs, started) as folder:
         write_cscan_ply(result.cscan, folder / "cscan.ply")
-        np.savez_compressed(
-            folder / "readings.npz",
-            lift_off_mm=result.lift_off_mm,
-            residual_ohm=result.residual_ohm,
-            covered=result.cscan.covered,
-            **{f"channel {name}": values for name, values in result.cscan.channels.items()},
-        )
+        np.savez_compressed(folder / "readings.npz", lift_off_mm=result.lift_off_mm, residual_ohm=result.residual_ohm)
         write_json(folder / "indications.json", [asdict(indication) for indication in result.indications])
         write_json(folder / "summary.json", result.statistics)
 

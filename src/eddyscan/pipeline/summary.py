@@ -52,7 +52,12 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         rows.append(["swept coverage", f"{100 * plan['swept_coverage']:.2f} %"])
     lift_off = summary["lift_off_mm"]
     if lift_off:
-        rows.append(["lift-off read, mean +- sd", f"{lift_off['mean']:.3f} +- {lift_off['sd']:.3f} mm"])
+        rows.append(
+            [
+                "lift-off read: mean (5 to 95 %)",
+                f"{lift_off['mean']:.3f} ({lift_off['p05']:.3f} to {lift_off['p95']:.3f}) mm",
+            ]
+        )
     rows.append(["indications", str(len(summary["indications"]))])
     rows += _truth_rows(summary.get("truth") or {})
     return rows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,11 +30,11 @@ def write_report(inspection: Inspection, rig: LazyRig, progress: Progress) -> No
     """Render report.html from whatever steps there are."""
     from eddyscan.report import render_html
 
-    inputs = inputs_of(inspection, "report")
+    started, inputs = datetime.now(UTC), inputs_of(inspection, "report")
     progress("report", 0, 2)
     content = report_content(inspection, rig)
     progress("report", 1, 2)
-    with inspection.writing("report", inputs) as folder:
+    with inspection.writing("report", inputs, started) as folder:
         (folder / "report.html").write_text(render_html(content), encoding="utf-8")
     progress("report", 2, 2)
 

@@ -1,0 +1,5 @@
+"""`python -m eddyscan` is `eddyscan`."""
+
+from eddyscan.cli import main
+
+main()
