@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def path_figure(plan: ScanPlan, mesh: SurfaceMesh | None, theme: Theme) -> Figure:
     """Draw the path from above: rows, links, start and end, and the uncovered spots."""
-    figure, axes = canvas(height_in=map_height_in(plan.surface_mm, 9.0, extra_in=1.0))
+    figure, axes = canvas(height_in=map_height_in(plan.surface_mm, 9.0, extra_in=1.35))
     if mesh is not None:
         _contours(axes, mesh, theme)
     spots = plan.surface_mm

@@ -51,10 +51,10 @@ def surface(content: ReportContent) -> Section:
     size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
     lead = (
         f"{size[0]:.1f} × {size[1]:.1f} × {size[2]:.1f} mm, {mesh.area_mm2 / 100:.1f} cm² of surface, "
-        f"{len(mesh.vertices)} vertices, {len(mesh.faces)} triangles. Drag to turn, scroll to zoom."
+        f"{len(mesh.vertices)} vertices, {len(mesh.faces)} triangles."
     )
     still = Chart(partial(still_figure, content), "The surface seen from the front, with the planned path.")
-    caption = "Measured surface with the planned path. The menu changes what the colour shows; grey: not covered."
+    caption = "Drag to turn, scroll to zoom. The menu changes what the colour shows; grey: not covered."
     blocks: list[Block] = [Scene(scene_json(content), caption, still)]
     if mesh.uncertainty_mm is not None:
         blocks.append(
