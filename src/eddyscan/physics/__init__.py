@@ -8,22 +8,30 @@ from eddyscan.physics.coil import Coil, air_inductance_h
 from eddyscan.physics.conductor import Conductor, Layer, skin_depth_mm
 from eddyscan.physics.impedance import impedance_change_ohm, impedance_ohm, least_lift_off_mm
 from eddyscan.physics.lift_off import LiftOffCurve
+from eddyscan.physics.placed import PlacedSlot, slots_change_ohm
 from eddyscan.physics.slot import Slot, slot_warnings, to_slot_frame
 from eddyscan.physics.slot_solver import SlotSolver, slot_change_ohm
+from eddyscan.physics.tables import SlotTable, build_table, slot_table, table_grid
 
 __all__ = [
     "Coil",
     "Conductor",
     "Layer",
     "LiftOffCurve",
+    "PlacedSlot",
     "Slot",
     "SlotSolver",
+    "SlotTable",
     "air_inductance_h",
+    "build_table",
     "impedance_change_ohm",
     "impedance_ohm",
     "least_lift_off_mm",
     "skin_depth_mm",
     "slot_change_ohm",
+    "slot_table",
     "slot_warnings",
+    "slots_change_ohm",
+    "table_grid",
     "to_slot_frame",
 ]

@@ -115,11 +115,11 @@ def wave_numbers(coil: Coil, *, reach_m: float = 0.0, finest_m: float | None = N
     functions at `outer radius + reach_m`, up to a cut-off where the squared
     source has fallen by 10 orders (or by exp(-k finest_m)).
     """
-    largest = coil.outer_m + 0.5 * reach_m
+    largest = coil.outer_m + 0.4 * reach_m
     top = max(60.0 / coil.inner_m if coil.inner_m > 0.15 * coil.outer_m else 400.0 / coil.outer_m, 120.0 / coil.outer_m)
     if finest_m is not None and finest_m > 0:
         top = min(top, max(40.0 / finest_m, 20.0 / coil.outer_m))
-    step = 3.0 / largest
+    step = 4.0 / largest
     edges = np.concatenate([[0.0], step * 2.0 ** np.arange(-16, 1), np.arange(2.0 * step, top + step, step)])
     return gauss_panels(edges, 10)
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.physics.metal import DepthProfile, SlottedMetal
-
-Folding = Callable[[Array], ComplexArray]
 
 
 class SlotBasis(Protocol):
@@ -41,11 +38,11 @@ class SlotBasis(Protocol):
     def line_weights(self, count: int) -> Array:
         """Return weights (count,) [m] that integrate over x at these places."""
 
-    def local_depth(self, x_m: float) -> float:
-        """Return the slot's depth [m] at x."""
+    def depth_columns(self, profile: DepthProfile) -> ComplexArray:
+        """Return what a depth profile contributes to each column (K, C)."""
 
-    def folding(self, profile: DepthProfile, count: int, scale: ComplexArray) -> Folding:
-        """Return the map from samples (P, count, K) and scales (H, K) to Galerkin integrals (P, H, size)."""
+    def fold(self, samples: ComplexArray) -> ComplexArray:
+        """Return Galerkin integrals (P, H, size) of samples (P, count, H, C): places along x, columns in depth."""
 
 
 def chebyshev_nodes(half_length_m: float, count: int) -> Array:

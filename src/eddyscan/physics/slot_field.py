@@ -6,15 +6,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import j1
 
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.physics.coil import Coil, source, wave_numbers
-from eddyscan.physics.metal import DepthProfile, SlottedMetal
+from eddyscan.physics.metal import SlottedMetal
 from eddyscan.physics.quadrature import gauss_panels
 from eddyscan.physics.slot_basis import SlotBasis
 
-SAMPLES_PER_CHUNK = 1_500_000
+VALUES_PER_CHUNK = 4_000_000
+RADII_PER_MEAN_RADIUS = 80
+LINE_DEPTHS = 8
 
 
 @dataclass(frozen=True)
@@ -38,53 +41,59 @@ class CoilOnSlot:
 
     The field in the metal is azimuthal (Dodd and Deeds 1968):
     E_phi(r, z) = -j omega mu0 i I integral of M(k) exp(-k h) (1 + Gamma)/2 f(z) J1(k r) dk.
+    Its depth integrals are tabulated once over the radius r, as splines of E_phi / r.
     """
 
     def __init__(self, coil: Coil, metal: SlottedMetal, basis: SlotBasis, *, reach_m: float, lift_off_m: Array) -> None:
-        self.basis = basis
+        self._basis = basis
         k, w = wave_numbers(coil, reach_m=reach_m, finest_m=float(lift_off_m.min()))
-        strength = np.abs(w * source(coil, k) * np.exp(-k * lift_off_m.min()))
-        keep = k <= k[strength > 1e-9 * strength.max()].max()
-        self.k, w = k[keep], w[keep]
-        detail = self.k[strength[keep] > 1e-6 * strength.max()].max()
-        self.count = int(max(2 * basis.highest_order + 12, 24 + 0.9 * detail * basis.half_length_m))
-        self.count = min(self.count, 400)
-        amplitude = -metal.j_omega_mu * coil.turn_density * w * source(coil, self.k)
-        self.scale = amplitude * np.exp(-np.outer(lift_off_m, self.k))
-        profile = metal.coil_profile(self.k)
-        self._fold = basis.folding(profile, self.count, self.scale)
-        self._nodes = basis.field_nodes(self.count)
-        self._along = self._along_weights(metal, profile)
+        strength = np.abs(source(coil, k)) * np.exp(-k * lift_off_m.min())
+        keep = k <= k[strength > 1e-8 * strength.max()].max()
+        k, w = k[keep], w[keep]
+        detail = k[strength[keep] > 1e-3 * strength.max()].max()
+        self._count = int(10 + 0.5 * basis.highest_order + 0.6 * detail * basis.half_length_m)
+        self._nodes = basis.field_nodes(self._count)
+        profile = metal.coil_profile(k)
+        amplitude = -metal.j_omega_mu * coil.turn_density * w * source(coil, k)
+        scale = amplitude * np.exp(-np.outer(lift_off_m, k))
+        self._heights = len(lift_off_m)
+        count = 8 + int(reach_m * RADII_PER_MEAN_RADIUS / coil.mean_radius_m)
+        radii = np.linspace(0.0, reach_m * (1 + 1e-9), count)
+        bessel = j1(np.outer(radii, k))
+        bessel[1:] /= radii[1:, None]
+        bessel[0] = 0.5 * k
+        self._across = self._spline(radii, bessel, scale, basis.depth_columns(profile))
+        self._along: BSpline | None = None
+        if metal.opening_m > 0:
+            t, wt = gauss_panels(np.array([0.0, 1.0]), LINE_DEPTHS)
+            self._line_weights = np.sqrt(metal.sigma * metal.opening_m * basis.line_weights(self._count))
+            columns = profile.values(-basis.depth_m * t) * np.sqrt(basis.depth_m * wt)
+            self._along = self._spline(radii, bessel, scale, columns)
 
-    def _along_weights(self, metal: SlottedMetal, profile: DepthProfile) -> list[ComplexArray] | None:
-        if metal.opening_m == 0:
-            return None
-        t, wt = gauss_panels(np.array([0.0, 0.25, 1.0]), 6)
-        weights = self.basis.line_weights(self.count)
-        found = []
-        for node, weight in zip(self._nodes, weights, strict=True):
-            depth = self.basis.local_depth(node)
-            size = np.sqrt(metal.sigma * metal.opening_m * weight * depth * wt)
-            values = profile.values(-depth * t) * size
-            found.append(np.einsum("hk,kq->khq", self.scale, values).reshape(len(self.k), -1))
-        return found
+    def _spline(self, radii: Array, bessel: Array, scale: ComplexArray, columns: ComplexArray) -> BSpline:
+        right = np.einsum("hk,kc->khc", scale, columns).reshape(scale.shape[1], -1)
+        values = bessel @ right.real + 1j * (bessel @ right.imag)
+        return make_interp_spline(radii, values, k=3)
 
     def drives(self, x_m: Array, y_m: Array) -> Iterator[tuple[slice, Drive]]:
         """Yield (which positions, their Drive) in chunks for coil axes at x, y (N,), (N,) [m, slot frame]."""
-        step = max(1, SAMPLES_PER_CHUNK // (self.count * len(self.k)))
+        columns = self._across.c.shape[1]
+        step = max(1, VALUES_PER_CHUNK // (self._count * columns))
         for start in range(0, len(x_m), step):
             part = slice(start, min(start + step, len(x_m)))
             dx = self._nodes - x_m[part, None]
             dy = np.broadcast_to(y_m[part, None], dx.shape)
             r = np.hypot(dx, dy)
-            bessel = j1(r[..., None] * self.k) / np.maximum(r, 1e-12)[..., None]
-            across = self._fold(bessel * dx[..., None])
-            yield part, Drive(across, self._along_values(bessel * dy[..., None]))
+            across = self._sampled(self._across, r) * dx[..., None, None]
+            yield part, Drive(self._basis.fold(across), self._along_values(r, dy))
 
-    def _along_values(self, samples: Array) -> ComplexArray:
-        heights = len(self.scale)
-        if self._along is None or not samples.any():
-            return np.zeros((len(samples), heights, 1), dtype=np.complex128)
-        parts = [samples[:, i] @ weights for i, weights in enumerate(self._along)]
-        shaped = [part.reshape(len(samples), heights, -1) for part in parts]
-        return np.concatenate(shaped, axis=2)
+    def _sampled(self, spline: BSpline, r: Array) -> ComplexArray:
+        rows = BSpline.design_matrix(r.ravel(), spline.t, 3)
+        return np.asarray(rows @ spline.c).reshape(*r.shape, self._heights, -1)
+
+    def _along_values(self, r: Array, dy: Array) -> ComplexArray:
+        if self._along is None or not dy.any():
+            return np.zeros((len(r), self._heights, 1), dtype=np.complex128)
+        weight = dy * self._line_weights
+        values = self._sampled(self._along, r) * weight[..., None, None]
+        return np.asarray(values.transpose(0, 2, 1, 3)).reshape(len(r), self._heights, -1)

@@ -16,7 +16,7 @@ from eddyscan.core.frames import Array, ComplexArray, IntArray
 from eddyscan.physics.bessel_rules import product_rule
 from eddyscan.physics.metal import DepthProfile, SlottedMetal
 from eddyscan.physics.quadrature import gauss_panels
-from eddyscan.physics.slot_basis import Folding, chebyshev_nodes, fejer_weights
+from eddyscan.physics.slot_basis import chebyshev_nodes, fejer_weights
 
 
 @dataclass(frozen=True)
@@ -98,25 +98,18 @@ class RectangleBasis:
         """Return weights (count,) [m] that integrate over x at these places."""
         return fejer_weights(self.half_length_m, count)
 
-    def local_depth(self, x_m: float) -> float:
-        """Return the slot's depth [m] at x."""
-        return self.depth_m
+    def depth_columns(self, profile: DepthProfile) -> ComplexArray:
+        """Return what a depth profile contributes to each column (K, down)."""
+        return self.depth_transform(profile)
 
-    def folding(self, profile: DepthProfile, count: int, scale: ComplexArray) -> Folding:
-        """Return the map from samples (P, count, K) and scales (H, K) to Galerkin integrals (P, H, size)."""
+    def fold(self, samples: ComplexArray) -> ComplexArray:
+        """Return Galerkin integrals (P, H, size) of samples (P, count, H, down)."""
+        places, count, heights, columns = samples.shape
         angle = np.arange(1, count + 1) * np.pi / (count + 1)
         along = np.sin(np.outer(np.arange(1, self.along + 1), angle)) * np.sin(angle)
         along *= self.half_length_m * np.pi / (count + 1)
-        heights = len(scale)
-        right = np.einsum("hk,kn->khn", scale, self.depth_transform(profile)).reshape(scale.shape[1], -1)
-        real, imaginary = np.ascontiguousarray(right.real), np.ascontiguousarray(right.imag)
-
-        def fold(samples: Array) -> ComplexArray:
-            left = np.matmul(along, samples).reshape(-1, samples.shape[2])
-            values = (left @ real + 1j * (left @ imaginary)).reshape(len(samples), self.along, heights, self.down)
-            return np.asarray(values.transpose(0, 2, 1, 3)).reshape(len(samples), heights, self.size)
-
-        return fold
+        values = np.matmul(along, samples.reshape(places, count, -1)).reshape(places, self.along, heights, columns)
+        return np.asarray(values.transpose(0, 2, 1, 3)).reshape(places, heights, self.size)
 
 
 def _signs(orders: IntArray, pairs: IntArray) -> Array:
