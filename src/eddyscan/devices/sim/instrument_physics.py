@@ -2,7 +2,7 @@
 
 The upright coil is `LiftOffCurve`; tilt enters as a factor on the change,
 tabulated from the exact tilted-coil integral on first use; curvature as extra
-lift-off. Edges have no model: up to the rim the surface is taken to go on,
+lift-off (`world_probe`). Edges have no model: up to the rim the surface is taken to go on,
 beyond it the coil leaves the metal by its plain distance to the rim. Readings
 within 1.7 outer radii of an edge are therefore not physics, and the truth
 marks them.
@@ -31,24 +31,9 @@ EDGE_RADII = 1.7
 
 
 def real_coil(nominal: WorldCoil, tolerance: float, seed: int) -> Coil:
-    """Return this copy of the coil: all sizes off by the same draw within `tolerance`.
-
-    Inductance is proportional to size, so the air value is off by the same share.
-    """
-    size = 1.0 + tolerance * np.random.default_rng([seed, 6]).uniform(-1, 1)
-    return Coil(nominal.inner_radius_mm * size, nominal.outer_radius_mm * size, nominal.length_mm * size, nominal.turns)
-
-
-def curvature_gap_mm(coil: Coil, lift_off_mm: float, curvature_per_mm: float) -> float:
-    """Return the extra lift-off [mm] that a curved surface looks like: r_eff^2 / 4 (kappa1 + kappa2).
-
-    r_eff / r2 = 0.793 + 0.60 h / r2 is the line through the two values found
-    with the exact coil over a sphere for r1 = r2 / 3 (1.25 mm at h = 0.1 mm,
-    1.37 mm at 0.3 mm, r2 = 1.5 mm), held constant beyond h = r2 / 2.
-    """
-    r2 = coil.outer_radius_mm
-    effective = r2 * (0.793 + 0.60 * min(max(lift_off_mm, 0.0) / r2, 0.5))
-    return effective**2 / 4 * curvature_per_mm
+    """Return this copy of the coil: each size off by its own draw within `tolerance`, the turns as counted."""
+    r1, r2, length = 1.0 + tolerance * np.random.default_rng([seed, 6]).uniform(-1, 1, 3)
+    return Coil(nominal.inner_radius_mm * r1, nominal.outer_radius_mm * r2, nominal.length_mm * length, nominal.turns)
 
 
 class CoilResponse:
@@ -63,8 +48,9 @@ class CoilResponse:
     def __init__(self, coil: Coil, conductor: Conductor, frequency_hz: float) -> None:
         self.coil, self.conductor, self.frequency_hz = coil, conductor, frequency_hz
         self.air_ohm = 2j * np.pi * frequency_hz * air_inductance_h(coil)
-        knots = FARTHEST_MM * np.linspace(0.0, 1.0, KNOTS) ** 2
-        self._upright = CubicSpline(knots, impedance_change_ohm(coil, conductor, frequency_hz, knots))
+        self._knots = FARTHEST_MM * np.linspace(0.0, 1.0, KNOTS) ** 2
+        changes = impedance_change_ohm(coil, conductor, frequency_hz, self._knots)
+        self._upright, self._sizes = CubicSpline(self._knots, changes), np.abs(changes)
         self._rows: dict[float, ComplexArray] = {}
         self._tilt_end = 0
         self._factor: tuple[RectBivariateSpline, RectBivariateSpline] | None = None
@@ -79,6 +65,11 @@ class CoilResponse:
         if tilt > LEAST_TILT_DEG:
             change *= self._tilt_factor(height - least_lift_off_mm(self.coil, tilt), tilt)
         return self.air_ohm + change
+
+    def upright_lift_off_mm(self, impedance_ohm: complex) -> float:
+        """Return the lift-off [mm] at which an upright coil changes as much (metal touched: 0)."""
+        change = abs(impedance_ohm - self.air_ohm)
+        return float(np.interp(-change, -self._sizes, self._knots))
 
     def _tilt_factor(self, clearance_mm: float, tilt_deg: float) -> complex:
         """Return dZ(tilted) / dZ(upright, same face height)."""

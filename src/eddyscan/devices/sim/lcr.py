@@ -11,13 +11,15 @@ import cmath
 import math
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from eddyscan.devices.clock import ScaledClock
 from eddyscan.devices.protocols import Clock
+from eddyscan.devices.sim.instrument_physics import real_coil
+from eddyscan.devices.sim.instrument_physics_noise import ReadingNoise
 from eddyscan.devices.sim.instrument_wire import InstrumentServer, LinkLost
-
-if TYPE_CHECKING:
-    from eddyscan.devices.sim.world_settings import WorldFaults
+from eddyscan.devices.sim.world_settings import WorldFaults, WorldSettings
+from eddyscan.physics import Conductor, air_inductance_h, impedance_ohm
 
 APERTURES = {"SHOR": 1.0, "MED": 88 / 5.6, "LONG": 220 / 5.6}
 OVERLOAD_VALUE = "+9.90000E+37"
@@ -30,6 +32,9 @@ class Coil(Protocol):
 
     def read(self, frequency_hz: float, aperture_s: float) -> complex:
         """Return the impedance [ohm] the meter finds now, imperfections included."""
+
+    def prepare(self, frequency_hz: float) -> None:
+        """Get ready for a frequency that was just set."""
 
     def sent(self, impedance_ohm: complex) -> None:
         """Be told what the wire carried, digits cut as they were."""
@@ -146,6 +151,7 @@ class LcrSimulator:
         if not 20.0 <= frequency <= 2e6:
             raise ValueError(value)
         self._frequency_hz = frequency
+        self._coil.prepare(frequency)
 
     def _set_level(self, value: str) -> None:
         level = float(value)
@@ -219,6 +225,46 @@ class LcrSimulator:
         if 0 < self._faults.lcr_silent_after <= self.readings:
             threading.Event().wait(30.0)
             raise LinkLost
+
+
+class StillCoil:
+    """A coil held over sound metal: what a stand-alone meter is given to measure."""
+
+    def __init__(self, lift_off_mm: float, seed: int = 1) -> None:
+        world = WorldSettings(seed=seed)
+        self._lift_off_mm, self._conductor = lift_off_mm, Conductor.half_space(world.conductivity_ms_m)
+        self._coil = real_coil(world.coil, world.instrument.coil_tolerance, seed)
+        self._noise = ReadingNoise(world.instrument, seed)
+        self._time_s = 0.0
+
+    def read(self, frequency_hz: float, aperture_s: float) -> complex:
+        """Return the impedance [ohm] with the instrument's usual imperfections."""
+        self._time_s += aperture_s
+        z = complex(impedance_ohm(self._coil, self._conductor, frequency_hz, self._lift_off_mm))
+        air = 2j * math.pi * frequency_hz * air_inductance_h(self._coil)
+        return self._noise.apply(z, air, self._time_s, aperture_s)
+
+    def prepare(self, frequency_hz: float) -> None:
+        """Nothing to get ready."""
+
+    def sent(self, impedance_ohm: complex) -> None:
+        """Nobody keeps the truth of a stand-alone meter."""
+
+
+def serve_lcr(port: int, *, lift_off_mm: float = 0.5, speed_factor: float = 1.0) -> None:
+    """Run a simulated E4980A with a coil over aluminium until Ctrl-C; prints where it listens."""
+    meter = LcrSimulator(StillCoil(lift_off_mm), ScaledClock(speed_factor))
+    host, bound = meter.start(port)
+    print(
+        f"simulated E4980A, coil {lift_off_mm:g} mm over aluminium, on TCPIP::{host}::{bound}::SOCKET - Ctrl-C ends it",
+        flush=True,
+    )
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        print("stopped", flush=True)
+    finally:
+        meter.close()
 
 
 def _short_form(head: str) -> str:

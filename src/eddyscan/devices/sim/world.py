@@ -50,6 +50,10 @@ class CoilAtStage:
         z, self._waiting = self._probe.feel(self._position(), frequency_hz, now)
         return self._probe.noise.apply(z, self._probe.air_ohm(frequency_hz), now, aperture_s)
 
+    def prepare(self, frequency_hz: float) -> None:
+        """Get ready for a frequency."""
+        self._probe.prepare(frequency_hz)
+
     def sent(self, impedance_ohm: complex) -> None:
         """File the truth under the numbers that went over the wire."""
         if self._waiting is not None:

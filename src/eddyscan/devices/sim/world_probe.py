@@ -9,13 +9,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from eddyscan.core.frames import Array, apply, invert
-from eddyscan.devices.sim.instrument_physics import CoilResponse, curvature_gap_mm, edge_zone_mm, real_coil
+from eddyscan.devices.sim.flaws_response import SlotSignals
+from eddyscan.devices.sim.instrument_physics import CoilResponse, edge_zone_mm, real_coil
 from eddyscan.devices.sim.instrument_physics_noise import ReadingNoise
 from eddyscan.devices.sim.world_facts import CellFacts
 from eddyscan.devices.sim.world_foot import FootFinder
 from eddyscan.devices.sim.world_placement import knocked
 from eddyscan.devices.sim.world_settings import WorldSettings
 from eddyscan.physics import Conductor
+from eddyscan.physics.sound_response import curvature_gap_mm
 
 StagePosition = Callable[[], Array]
 
@@ -63,6 +65,7 @@ class ProbeOverPart:
         self.noise = ReadingNoise(settings.instrument, settings.seed)
         self.history: list[tuple[complex, TrueReading]] = []
         self._responses: dict[float, CoilResponse] = {}
+        self._signals: dict[float, SlotSignals] = {}
 
     def pose(self, stage_mm: Array, time_s: float) -> TrueReading:
         """Return the truth for a coil position (3,) [mm, stage]."""
@@ -83,8 +86,17 @@ class ProbeOverPart:
         response = self._response(frequency_hz)
         gap = max(truth.lift_off_mm, 0.0)
         if truth.edge_mm > 0:
-            gap = max(gap + curvature_gap_mm(self.coil, gap, truth.curvature_per_mm), 0.0)
-        return response.impedance_ohm(gap, truth.tilt_deg), truth
+            bulge = curvature_gap_mm(self.coil, np.array(gap), np.array(truth.curvature_per_mm))
+            gap = max(gap + float(bulge), 0.0)
+        z = response.impedance_ohm(gap, truth.tilt_deg)
+        if truth.edge_mm > 0 and self._flaws:
+            z += self._slots(frequency_hz).change_ohm(truth.foot_mm, response.upright_lift_off_mm(z))
+        return z, truth
+
+    def prepare(self, frequency_hz: float) -> None:
+        """Begin to build the slots' tables for a frequency the instrument was set to."""
+        if self._flaws:
+            self._slots(frequency_hz)
 
     def air_ohm(self, frequency_hz: float) -> complex:
         """Return j omega L0 of the real coil [ohm]."""
@@ -93,6 +105,11 @@ class ProbeOverPart:
     def remember(self, as_read_ohm: complex, truth: TrueReading) -> None:
         """File the truth under the impedance that the wire carried, which is all the software will know."""
         self.history.append((as_read_ohm, truth))
+
+    def _slots(self, frequency_hz: float) -> SlotSignals:
+        if frequency_hz not in self._signals:
+            self._signals[frequency_hz] = SlotSignals(self._flaws, self.coil, self.conductor, frequency_hz)
+        return self._signals[frequency_hz]
 
     def _response(self, frequency_hz: float) -> CoilResponse:
         if frequency_hz not in self._responses:

@@ -55,7 +55,9 @@ class WorldInstrument(Section):
     drift_period_s: float = Field(1800.0, gt=0, description="period of the temperature swing, s")
     wire_resistance_ohm: float = Field(1.2, ge=0, description="dc resistance of coil and cable, ohm")
     wire_per_k: float = Field(0.0039, ge=0, description="relative change of the wire resistance per K (copper)")
-    coil_tolerance: float = Field(0.02, ge=0, le=0.2, description="largest error of this coil's inductance, relative")
+    coil_tolerance: float = Field(
+        0.02, ge=0, le=0.2, description="largest error of each of this coil's sizes, relative"
+    )
     null_offset_ohm: float = Field(0.05, ge=0, description="residual of the short correction, ohm")
     digits: int = Field(6, ge=3, le=9, description="significant digits of a reading")
     short_s: float = Field(0.0056, ge=0, description="time of a reading with short aperture, s")
