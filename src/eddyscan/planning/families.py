@@ -10,8 +10,8 @@ from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.topology import Edges
 
 STEEPEST = 4.0
-# Rows may lie this much further apart when that saves one: fields are good to half a percent.
-STRETCH = 0.004
+# Rows may lie this much further apart when that saves one.
+STRETCH = 0.0005
 
 
 def plane_levels(

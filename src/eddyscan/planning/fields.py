@@ -2,13 +2,13 @@
 
 The first guess is the heat method (Crane, Weischedel, Wardetzky 2013). Policy
 iteration sharpens it: with the way X the distance grows known, it solves
-X . grad(phi) = 1 by least squares, takes the new way from the result, and
-again. An error in the way enters the distance squared, so two rounds do.
+X . grad(phi) = 1 by least squares, may take the new way from
+the result and go again. An error in the way enters the distance squared, so one round does.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,10 @@ from scipy.sparse.linalg import splu
 
 from eddyscan.core.errors import GeometryError
 from eddyscan.core.frames import Array, BoolArray, IntArray
+from eddyscan.planning.trace import Rays
 
 # Share of plain smoothing kept across the way of growth, round by round.
-ACROSS = (0.2, 0.05)
+ACROSS = (0.1,)
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,9 @@ class Gradients:
     hat: Array
     n_vertices: int
 
-    def of(self, field: Array) -> Array:
+    def of(self, values: Array) -> Array:
         """Return the gradient (F, 3) of a vertex field (V,)."""
-        return np.asarray(np.einsum("fik,fi->fk", self.hat, field[self.faces]))
+        return np.asarray(np.einsum("fik,fi->fk", self.hat, values[self.faces]))
 
     def matrix(self, local: Array) -> csc_matrix:
         """Sum (F, 3, 3) corner matrices into a sparse (V, V) one."""
@@ -66,11 +67,18 @@ def gradients(vertices: Array, faces: IntArray) -> Gradients:
 
 @dataclass(frozen=True)
 class Seed:
-    """Where distance is known: vertices (K,), their distance (K,) [mm], the sign (V,) of either side."""
+    """Where distance is known, and how it leaves.
+
+    Attributes
+    ----------
+    vertex : (K,), distance_mm : (K,) signed, side : (V,) sign of the distance
+    rays : list of Rays, square to the seed
+    """
 
     vertex: IntArray
     distance_mm: Array
     side: Array
+    rays: list[Rays] = field(default_factory=list)
 
 
 def distance_field(mesh: Gradients, seed: Seed) -> Array:

@@ -10,7 +10,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial import Delaunay, KDTree, QhullError
 
 from eddyscan.core.frames import Array, IntArray
-from eddyscan.core.mesh import face_vectors
+from eddyscan.core.mesh import face_vectors, vertex_normals
 from eddyscan.planning.smooth import tangents_of
 from eddyscan.planning.topology import border_loops
 
@@ -24,7 +24,7 @@ class Filled:
 
     Attributes
     ----------
-    vertices : (V', 3), faces : (F', 3)
+    vertices, normals : (V', 3), faces : (F', 3)
         The patch's own come first, in order; then those of the fillings.
     n_faces : int, of the patch itself
     hole_mm : (V',)
@@ -35,11 +35,17 @@ class Filled:
     """
 
     vertices: Array
+    normals: Array
     faces: IntArray
     n_faces: int
     hole_mm: Array
     outer: list[IntArray]
     n_holes: int
+
+    @property
+    def edge_mm(self) -> float:
+        """Return a typical edge length [mm]."""
+        return float(np.sqrt(2.3 * np.median(np.linalg.norm(face_vectors(self.vertices, self.faces), axis=1)) / 2))
 
 
 def fill_holes(vertices: Array, faces: IntArray, normals: Array) -> Filled:
@@ -59,10 +65,11 @@ def fill_holes(vertices: Array, faces: IntArray, normals: Array) -> Filled:
         all_faces.append(cap[1])
         n += len(cap[0])
         done.append(loop)
-    whole = np.concatenate(all_vertices)
-    return Filled(
-        whole, np.concatenate(all_faces), len(faces), _hole_distance(whole, len(vertices), done), outer, len(done)
-    )
+    whole, all_of_it = np.concatenate(all_vertices), np.concatenate(all_faces)
+    if done:
+        normals = np.concatenate([normals, vertex_normals(whole, all_of_it)[len(vertices) :]])
+    distance = _hole_distance(whole, len(vertices), done)
+    return Filled(whole, normals, all_of_it, len(faces), distance, outer, len(done))
 
 
 def _perimeter(points: Array) -> float:

@@ -13,7 +13,7 @@ def boustrophedon(strokes: list[Stroke]) -> list[Stroke]:
         return []
     run = [strokes[0]]
     for stroke in strokes[1:]:
-        at = run[-1].points[0] if run[-1].closed else run[-1].points[-1]
+        at = run[-1].points[-1]
         if stroke.closed:
             run.append(_begun_near(stroke, at))
             continue
@@ -24,8 +24,8 @@ def boustrophedon(strokes: list[Stroke]) -> list[Stroke]:
 
 def _begun_near(stroke: Stroke, at: np.ndarray) -> Stroke:
     """Return a closed stroke that begins at its reading nearest to `at`."""
-    k = int(np.argmin(np.linalg.norm(stroke.points - at, axis=1)))
+    k = int(np.argmin(np.linalg.norm(stroke.points[:-1] - at, axis=1)))
     if k == 0:
         return stroke
-    points, normals = np.roll(stroke.points, -k, axis=0), np.roll(stroke.normals, -k, axis=0)
-    return Stroke(points, normals, stroke.s_mm, stroke.path, stroke.path_normals, stroke.level, True)
+    points, normals = (np.concatenate([rows[k:-1], rows[: k + 1]]) for rows in (stroke.points, stroke.normals))
+    return Stroke(points, normals, stroke.s_mm, stroke.path, stroke.path_normals, stroke.level, closed=True)

@@ -1,7 +1,7 @@
 """A smooth surface through a mesh: local quadrics over the probe's footprint.
 
 Every vertex gets a weighted least-squares quadric over its neighbours
-(moving least squares, Levin 1998; weights of Wendland 1995). A point inside
+(moving least squares, Levin 1998, with biweights). A point inside
 a triangle blends the quadrics of its corners, so positions, normals and
 curvature come from the smooth fit at that very point.
 """
@@ -15,10 +15,14 @@ from scipy.spatial import KDTree
 
 from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.mesh import face_vectors, vertex_normals
+from eddyscan.planning.topology import border_edges
 
 NORMAL_TARGET_DEG = 0.4
-MAX_NEIGHBOURS = 64
-CHUNK = 8192
+WIDEST_OF_LEAST = 2.4
+AT_BORDERS = 1.35
+WIDEST_MM = 10.0
+MAX_NEIGHBOURS = 140
+CHUNK = 4096
 
 
 @dataclass(frozen=True)
@@ -50,12 +54,13 @@ class SmoothSurface:
         where, normal = np.zeros_like(points), np.zeros_like(points)
         for corner in range(3):
             vertex = self.faces[face, corner]
-            P, n = self._lift(points, vertex)
+            P, n = self.lifted(points, vertex)
             where += weight[:, corner, None] * P
             normal += weight[:, corner, None] * n
         return where, normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
-    def _lift(self, points: Array, vertex: IntArray) -> tuple[Array, Array]:
+    def lifted(self, points: Array, vertex: IntArray) -> tuple[Array, Array]:
+        """Return points (N, 3) lifted onto the fits of vertices (N,), and the fits' normals there."""
         x, t, n = self.vertices[vertex], self.tangents[vertex], self.normals[vertex]
         q = self.quadric[vertex]
         d = points - x
@@ -92,50 +97,71 @@ def smoothed(vertices: Array, faces: IntArray, footprint_mm: float) -> SmoothSur
     vertices : (V, 3) [mm], faces : (F, 3)
     footprint_mm : float
         Width the probe sees: the least diameter of the fits. It grows with the
-        mesh's noise until normals are good to about 0.4 degrees.
+        mesh's noise until normals are good to about 0.4 degrees, and again near
+        borders, where neighbours are on one side only.
     """
     area = 0.5 * np.linalg.norm(face_vectors(vertices, faces), axis=1).sum()
     density = len(vertices) / max(area, 1e-12)
-    least = max(footprint_mm / 2, 2.2 / np.sqrt(density))
-    tree, normals = KDTree(vertices), vertex_normals(vertices, faces)
+    least = max(min(footprint_mm, WIDEST_MM) / 2, 2.4 / np.sqrt(density))
+    cloud = _Cloud(vertices, vertex_normals(vertices, faces), KDTree(vertices), density)
     sample = np.linspace(0, len(vertices) - 1, min(len(vertices), 600)).astype(np.int64)
-    noise_mm = float(np.median(_fit(vertices, normals, tree, sample, least)[4]))
-    # Slope error of a least-squares plane in a disc: 2 sigma / (sqrt(pi density) r^2).
-    wanted = np.sqrt(2 * noise_mm / (np.radians(NORMAL_TARGET_DEG) * np.sqrt(np.pi * density)))
-    radius = float(np.clip(wanted, least, 1.8 * least))
-    parts = [
-        _fit(vertices, normals, tree, np.arange(k, min(k + CHUNK, len(vertices))), radius)
-        for k in range(0, len(vertices), CHUNK)
-    ]
-    fitted, n, t, q, _ = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return SmoothSurface(fitted, faces, n, t, q, noise_mm, radius)
+    noise_mm = float(np.median(_fit(cloud, sample, least)[4]))
+    # Slope error of a biweight quadric in a disc: 1.75 sigma / (sqrt(density) r^2), per direction.
+    wanted = np.sqrt(1.25 * 1.75 * noise_mm / (np.radians(NORMAL_TARGET_DEG) * np.sqrt(density)))
+    radius = float(np.clip(wanted, least, WIDEST_OF_LEAST * least))
+    columns = [np.empty((len(vertices), *shape)) for shape in ((3,), (3,), (2, 3), (3,))]
+    for group, reach in _groups(vertices, faces, radius, one_sided=wanted > least):
+        for k in range(0, len(group), CHUNK):
+            which = group[k : k + CHUNK]
+            for column, values in zip(columns, _fit(cloud, which, reach), strict=False):
+                column[which] = values
+    fitted, normals, tangents, quadric = columns
+    return SmoothSurface(fitted, faces, normals, tangents, quadric, noise_mm, radius)
 
 
-def _fit(
-    vertices: Array, normals: Array, tree: KDTree, which: IntArray, radius_mm: float
-) -> tuple[Array, Array, Array, Array, Array]:
-    k = min(MAX_NEIGHBOURS, len(vertices))
-    distance, index = (np.asarray(column) for column in tree.query(vertices[which], k=k))
-    radius = np.maximum(radius_mm, 1.05 * distance[:, min(9, k - 1)])[:, None]
-    x0, n0 = vertices[which], normals[which]
+def _groups(vertices: Array, faces: IntArray, radius: float, *, one_sided: bool) -> list[tuple[IntArray, float]]:
+    border = np.unique(border_edges(faces))
+    everything = np.arange(len(vertices))
+    if not one_sided or len(border) == 0:
+        return [(everything, radius)]
+    near = np.asarray(KDTree(vertices[border]).query(vertices)[0]) < radius / 2
+    return [(everything[~near], radius), (everything[near], AT_BORDERS * radius)]
+
+
+@dataclass(frozen=True)
+class _Cloud:
+    vertices: Array
+    normals: Array
+    tree: KDTree
+    density: float
+
+
+def _fit(cloud: _Cloud, which: IntArray, radius_mm: float) -> tuple[Array, Array, Array, Array, Array]:
+    """Return points, normals, tangents, second forms and the residual's sigma at some vertices."""
+    if len(which) == 0:
+        return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2, 3)), np.empty((0, 3)), np.empty(0)
+    wanted = int(1.1 * cloud.density * np.pi * radius_mm**2) + 4
+    k = min(int(np.clip(wanted, 14, MAX_NEIGHBOURS)), len(cloud.vertices))
+    distance, index = (np.asarray(column) for column in cloud.tree.query(cloud.vertices[which], k=k))
+    scale = np.maximum(radius_mm, 1.05 * distance[:, min(9, k - 1)])
+    x0, n0 = cloud.vertices[which], cloud.normals[which]
     t0 = tangents_of(n0)
-    d = vertices[index] - x0[:, None]
-    u, v = np.einsum("nkj,nj->nk", d, t0[:, 0]), np.einsum("nkj,nj->nk", d, t0[:, 1])
-    h = np.einsum("nkj,nj->nk", d, n0)
+    d = cloud.vertices[index] - x0[:, None]
+    local = np.einsum("nkj,naj->ank", d, np.concatenate([t0, n0[:, None]], axis=1))
+    u, v = local[0] / scale[:, None], local[1] / scale[:, None]
     # Neighbours across a thin wall face the other way and are left out.
-    same_side = np.einsum("nkj,nj->nk", normals[index], n0) > 0.3
-    ratio = np.clip(distance / radius, 0, 1)
-    weight = (1 - ratio) ** 4 * (4 * ratio + 1) * same_side
-    scale = radius
-    basis = np.stack([np.ones_like(u), u / scale, v / scale, *(0.5 * (a * b) / scale**2 for a, b in ((u, u), (v, v)))])
-    basis = np.concatenate([basis, (u * v / scale**2)[None]])
-    A = np.einsum("ank,nk,bnk->nab", basis, weight, basis) + 1e-9 * np.eye(6)
-    b = np.einsum("ank,nk,nk->na", basis, weight, h)
-    c = np.linalg.solve(A, b[..., None])[..., 0]
-    residual = h - np.einsum("na,ank->nk", c, basis)
-    freedom = np.maximum((weight > 0).sum(axis=1) - 6, 1)
-    sigma = np.sqrt((residual**2 * (weight > 0)).sum(axis=1) / freedom)
-    return (*_reframed(x0, n0, t0, c / np.concatenate([scale**p for p in (0, 1, 1, 2, 2, 2)], axis=1)), sigma)
+    same_side = np.einsum("nkj,nj->nk", cloud.normals[index], n0) > 0.3
+    weight = np.clip(1 - (distance / scale[:, None]) ** 2, 0, None) ** 2 * same_side
+    basis = np.stack([np.ones_like(u), u, v, 0.5 * u * u, 0.5 * v * v, u * v], axis=-1)
+    weighted = (basis * weight[..., None]).transpose(0, 2, 1)
+    A = weighted @ basis + 1e-9 * np.eye(6)
+    c = np.linalg.solve(A, weighted @ local[2][..., None])[..., 0]
+    residual = local[2] - (basis @ c[..., None])[..., 0]
+    inside = weight > 0
+    freedom = np.maximum(inside.sum(axis=1) - 6, 1)
+    sigma = np.sqrt((residual**2 * inside).sum(axis=1) / freedom)
+    powers = np.stack([scale**p for p in (0, 1, 1, 2, 2, 2)], axis=1)
+    return (*_reframed(x0, n0, t0, c / powers), sigma)
 
 
 def _reframed(x0: Array, n0: Array, t0: Array, c: Array) -> tuple[Array, Array, Array, Array]:

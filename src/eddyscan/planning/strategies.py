@@ -5,8 +5,7 @@ from __future__ import annotations
 from eddyscan.core.frames import Array
 from eddyscan.core.technique import Plan
 from eddyscan.planning.families import even_levels, plane_levels, ring_field, span_inside
-from eddyscan.planning.fields import distance_field
-from eddyscan.planning.geodesic import field_mesh, geodesic_lines
+from eddyscan.planning.geodesic import distance_from, field_mesh, geodesic_lines
 from eddyscan.planning.levels import Line, clipped, level_lines
 from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.topology import edges_of
@@ -22,7 +21,7 @@ def lines_for(surface: SmoothSurface, settings: Plan, guard: Array) -> list[Line
         return []
     if settings.strategy == "geodesic":
         mesh = field_mesh(surface)
-        field = distance_field(mesh.calculus, mesh.seeds[0])
+        field = distance_from(mesh, next(mesh.seeds))
         return geodesic_lines(mesh, field, guard, settings.pitch_mm)
     edges = edges_of(surface.faces)
     if settings.strategy == "encircle":

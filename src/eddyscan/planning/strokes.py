@@ -25,7 +25,7 @@ class Stroke:
     path, path_normals : (M, 3) the line in between, finely
     level : float, of the row's field
     closed : bool
-        The last point is followed by the first; points are not repeated.
+        The last reading repeats the first: the sweep has no gap and drift shows.
     """
 
     points: Array
@@ -87,7 +87,7 @@ def _lifted(line: Line, surface: SmoothSurface) -> tuple[Array, Array]:
 def _stations(length: float, step: float, *, closed: bool) -> Array:
     if closed:
         n = max(3, round(length / step))
-        return np.asarray(np.arange(n) * (length / n))
+        return np.linspace(0.0, length, n + 1)
     n = max(1, round(length / step))
     over = length - n * step * (1 + SPACING_OF_STEP)
     trim = float(np.clip(over / 2, 0.0, TRIM_OF_STEP * step))

@@ -91,8 +91,6 @@ def spacings(strokes: list[Stroke]) -> Array:
     parts = [np.empty(0)]
     for stroke in strokes:
         p, n = stroke.points, stroke.normals
-        if stroke.closed:
-            p, n = np.concatenate([p, p[:1]]), np.concatenate([n, n[:1]])
         parts.append(surface_distance(p[:-1], p[1:], n[:-1], n[1:]))
     return np.concatenate(parts)
 
