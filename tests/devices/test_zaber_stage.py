@@ -9,6 +9,7 @@ from eddyscan.devices.drivers.zaber import ZaberStage
 from eddyscan.devices.drivers.zaber_settings import STUDY_CHAIN, ZaberStageSettings
 from eddyscan.devices.sim.zaber import Fault
 from eddyscan.devices.sim.zaber_settings import ZaberSettings
+from tests.devices.path_contract import PathContract, wave_path
 from tests.devices.stage_contract import StageContract
 from tests.devices.zaber_cell import zaber_cell
 
@@ -123,8 +124,8 @@ def test_a_cut_link_is_told_and_stop_opens_it_again(cell):
     with pytest.raises(LinkError):
         cell.stage.move(np.array([200.0, 60.0, 30.0]), 5.0)
     cell.stage.stop()
-    cell.clock.sleep(1.0)
     cell.stage.position()
+    cell.clock.sleep(1.0)
     assert not cell.simulator.moving()
     assert cell.stage.position()[0] < 60.0
 
@@ -170,3 +171,27 @@ def test_positions_are_whole_microsteps_and_truth_differs_by_the_error_map(cell)
         cell.stage.move(np.array([x, 60.0, 30.0]))
         errors.append(cell.simulator.true_position()[0] - cell.stage.position()[0])
     assert 0.7 * 0.060 < np.ptp(errors) < 1.2 * 0.060
+
+
+class TestZaberPaths(PathContract):
+    @pytest.fixture(params=["chain-7", "chain-6", "serial-pace", "controller-row", "controller-pvt"])
+    def path_stage(self, request):
+        settings = {
+            "chain-6": ZaberSettings(firmware="6.28"),
+            "serial-pace": ZaberSettings(reply_delay_s=0.0043),
+        }.get(request.param, ZaberSettings(layout="mcc" if "controller" in request.param else "chain"))
+        clock = VirtualClock()
+        with zaber_cell(clock, settings) as cell:
+            self.cell = cell
+            start = np.array([20.0, 30.0, 20.0])
+            cell.stage.move(start)
+            yield cell.stage, clock, "pvt" if request.param.endswith("pvt") else "row", start
+
+    @pytest.fixture
+    def at_rest(self, path_stage):
+        return lambda: not self.cell.simulator.moving()
+
+
+def test_a_chain_refuses_timed_points(cell):
+    with pytest.raises(MotionError, match="this stage follows paths as row, not as pvt"):
+        cell.stage.start_path(wave_path(HERE), "pvt")

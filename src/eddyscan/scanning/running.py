@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 
-from eddyscan.core.errors import TechniqueError
 from eddyscan.core.frames import Array, checked_transform
 from eddyscan.core.plan import ScanPlan
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.technique import Technique
 from eddyscan.devices.protocols import Clock, EddyInstrument, RecordSink, Stage
 from eddyscan.scanning.checking import check
+from eddyscan.scanning.rows import scan_in_rows
 from eddyscan.scanning.stepping import scan_in_steps
 from eddyscan.scanning.targets import stage_targets, travel_height_mm, with_z
 
 
-@dataclass(frozen=True)
+@dataclass
 class Scan:
     """One run of one plan: the values and devices every mode of scanning needs.
 
     `targets` are the axis readings (N, 3) [mm, stage] of the plan's poses,
-    `height_mm` the z reading at which the probe crosses over the part.
+    `height_mm` the z reading at which the probe crosses over the part, `at` the
+    pose where the probe stands (None: elsewhere).
     """
 
     plan: ScanPlan
@@ -34,7 +35,8 @@ class Scan:
     targets: Array
     height_mm: float
     began_s: float
-    progress: Progress = field(default=silent)
+    progress: Progress = silent
+    at: int | None = None
 
 
 def run(
@@ -77,9 +79,10 @@ def run(
         if not stage.is_homed():
             stage.home()
         instrument.configure(technique.drive)
-        if technique.scan.mode != "step":
-            raise TechniqueError(f'scan mode {technique.scan.mode!r} is not built yet; use mode = "step".')
-        scan_in_steps(scan)
+        if technique.scan.mode == "step":
+            scan_in_steps(scan)
+        else:
+            scan_in_rows(scan, technique.scan.mode)
 
 
 def _note_settings(scan: Scan, T_stage_part: Array) -> None:

@@ -18,17 +18,22 @@ if TYPE_CHECKING:
 def scan_in_steps(scan: Scan) -> None:
     """Visit the plan's poses in order; a pose whose reading exists is not visited again."""
     done = scan.sink.done()
-    plan, at = scan.plan, -1
+    plan = scan.plan
     has_reading = [(int(r), int(p)) in done for r, p in zip(plan.row, plan.point, strict=True)]
     for count, leg in enumerate(legs(plan.kind, has_reading), len(done) + 1):
-        for index in leg:
-            if index != at + 1 or at < 0:
-                hop(scan, scan.targets[index])
-            else:
-                scan.stage.move(scan.targets[index], float(plan.speed_mm_s[index]) or None)
-            at = index
-        read_point(scan, at)
+        approach_leg(scan, leg[:-1], leg[-1])
+        read_point(scan, leg[-1])
         scan.progress("scan", count, plan.n_scan)
+
+
+def approach_leg(scan: Scan, leading: list[int], index: int) -> None:
+    """Go to a pose through the poses that lead to it; from anywhere else up, across and down."""
+    for each in (*leading, index):
+        if scan.at is None or each != scan.at + 1:
+            hop(scan, scan.targets[each])
+        else:
+            scan.stage.move(scan.targets[each], float(scan.plan.speed_mm_s[each]) or None)
+        scan.at = each
 
 
 def legs(kind: IntArray, has_reading: list[bool]) -> list[list[int]]:

@@ -11,8 +11,9 @@ from eddyscan.core.errors import MotionError
 from eddyscan.core.frames import Array, IntArray
 from eddyscan.devices.drivers.zaber_axes import ConnectedAxis, connect_axes, speeds_to_arrive_together
 from eddyscan.devices.drivers.zaber_link import Told, ZaberLink
+from eddyscan.devices.drivers.zaber_paths import Follower, Looker, SteeredChain, TimedPoints
 from eddyscan.devices.drivers.zaber_settings import ZaberStageSettings
-from eddyscan.devices.protocols import Axis, Clock, Identity
+from eddyscan.devices.protocols import Axis, Clock, Identity, PathSample, TimedPath
 
 LOOK_S = 0.1  # of the rig's clock, between two looks at a moving stage
 SOON_S = 0.002
@@ -37,7 +38,9 @@ class ZaberStage:
     def __init__(self, settings: ZaberStageSettings, clock: Clock) -> None:
         self.settings, self.clock = settings, clock
         self._owner = threading.RLock()
-        self._stops = 0
+        self._stops = self._path_stops = 0
+        self._follower: Follower | None = None
+        self._path_end: IntArray = np.zeros(0, dtype=np.int64)
         self._link = ZaberLink(settings)
         try:
             self._axes = connect_axes(self._link, settings)
@@ -102,7 +105,47 @@ class ZaberStage:
             for i in going:
                 self._axes[i].start_move(self._link, int(counts[i]), plan)
             self._wait([self._axes[i] for i in going], stops, expected_s=plan.duration_s)
-            self._verify(counts, list(range(len(counts))))
+            self._verify(counts)
+
+    def path_modes(self) -> tuple[str, ...]:
+        """Return "row" always, "pvt" where one controller with firmware 7 holds all axes."""
+        one_device = len({axis.table.device for axis in self._axes}) == 1 and len(self._axes) > 1
+        return ("row", "pvt") if one_device and self._axes[0].takes_speed_with_move else ("row",)
+
+    def start_path(self, path: TimedPath, mode: str) -> float:
+        """Begin to follow `path` from its start, where the stage must stand; return its time zero.
+
+        Raises
+        ------
+        TravelError
+            Before anything moves, when any of its positions lies outside an axis.
+        MotionError
+            When the stage stands elsewhere or cannot follow in this mode.
+        """
+        counts = [self._counts(position) for position in path.position]
+        with self._owner:
+            if mode not in self.path_modes():
+                raise MotionError(f"this stage follows paths as {', '.join(self.path_modes())}, not as {mode}.")
+            self._verify(counts[0])
+            self._path_stops = self._stops
+            looker = Looker(self._link, self._axes, self.clock, self.settings.read_retries)
+            self._follower = TimedPoints(looker, path) if mode == "pvt" else SteeredChain(looker, path)
+            self._path_end = counts[-1]
+            return self._follower.began_s
+
+    def follow_path(self) -> PathSample:
+        """Read the axes and keep them on the path; verifies the end when nothing moves any more."""
+        with self._owner:
+            if self._follower is None:
+                raise MotionError("no path was begun; call start_path first.")
+            self._refuse_if_stopped(self._path_stops)
+            sample = self._follower.step()
+            self._refuse_if_stopped(self._path_stops)
+            self._refuse_faults(self._follower.looked_at, self._follower.told, homing=False)
+            if not sample.moving:
+                self._follower = None
+                self._verify(self._path_end)
+            return sample
 
     def position(self) -> Array:
         """Return measured positions (n_axes,) [mm or deg]; step counts where an axis has no encoder."""
@@ -194,9 +237,8 @@ class ZaberStage:
             "all axes were told to stop. Free the axis, home the stage and run again."
         )
 
-    def _verify(self, counts: IntArray, which: list[int]) -> None:
-        for i in which:
-            axis = self._axes[i]
+    def _verify(self, counts: IntArray) -> None:
+        for i, axis in enumerate(self._axes):
             told = self._look(axis) if axis.last_count != counts[i] else None
             off = axis.reading(axis.last_count) - axis.reading(int(counts[i]))
             if abs(off) > self.settings.tolerance:

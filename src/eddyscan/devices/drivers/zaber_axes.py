@@ -108,6 +108,23 @@ class ConnectedAxis:
         self.set(link, "accel", acceleration)
         link.act(*self.where, f"move abs {count}", lambda a: a.move_absolute(count, wait_until_idle=False))
 
+    def send_on(self, link: ZaberLink, count: int, native_speed: int) -> None:
+        """Send an axis that may be moving to a new target at a new speed.
+
+        As a plain line: the library's own call would spend a second one on
+        clearing the flag that a pre-empted move raises.
+        """
+        if self.takes_speed_with_move:
+            link.tell(*self.where, f"move abs {count} {native_speed}")
+            return
+        self.set(link, "maxspeed", native_speed)
+        link.tell(*self.where, f"move abs {count}")
+
+    def native_speed(self, speed: float) -> int:
+        """Return a signed speed [unit/s] in the device's units and direction."""
+        native = round(speed / self.table.microstep * SPEED_UNIT)
+        return -native if self.table.inverted else native
+
     def set(self, link: ZaberLink, name: str, value: int) -> None:
         """Change a setting of the device, remembering what it was."""
         if self._changed.get(name, self.reported[name]) != str(value):

@@ -81,6 +81,17 @@ class ZaberLink:
                 self._connection = self._open()
                 self._suspect = False
 
+    def device_of(self, number: int) -> Any:
+        """Return the library's object of a device, for calls that only devices have."""
+        return self._axis(number, 0)
+
+    def call(self, number: int, what: str, action: Callable[[], Any]) -> None:
+        """Run a library call for device `number`, its faults in our words."""
+        try:
+            action()
+        except Exception as fault:
+            raise self._in_our_words(fault, number, what) from fault
+
     def close(self) -> None:
         """Close the line; more than once is fine."""
         with contextlib.suppress(Exception):
