@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from scipy.optimize import least_squares
 
+from eddyscan.core.errors import WorkError
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.devices.protocols import PathStage, TimedPath
 from eddyscan.scanning.trajectory import row_path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 LINE_MM = 2.0
 LARGEST_S = 0.15
+LARGEST_UNCERTAINTY_S = 0.004
 DEGREE = 6
 SPEED_SHARES = (1.0, 0.4)  # two speeds tell a delay from backlash
 DIRECTION_S = 0.01
@@ -54,6 +56,12 @@ def measure_latency(scan: Scan, mode: str) -> Latency:
             _drive_line(scan, mode, path, (times, values, looks))
     t, z = np.array([look[0] for look in looks]), np.array([look[1] for look in looks])
     latency = fit_latency(np.array(times), np.array(values), t, z)
+    if not latency.uncertainty_s < LARGEST_UNCERTAINTY_S:
+        raise WorkError(
+            f"the delay between readings and positions came out as {1e3 * latency.seconds:.1f} ms with an uncertainty of "
+            f"{1e3 * latency.uncertainty_s:.1f} ms (limit {1e3 * LARGEST_UNCERTAINTY_S:.0f}) from {latency.readings} "
+            "readings above the row's first point. Check that the probe reads the part there, or set scan.mode to step."
+        )
     scan.sink.note("latency", {**asdict(latency), "mode": mode})
     return latency
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from eddyscan.core.errors import MotionError
 from eddyscan.core.frames import Array, IntArray
-from eddyscan.devices.drivers.zaber_axes import ConnectedAxis, connect_axes, speeds_to_arrive_together
+from eddyscan.devices.drivers.zaber_axes import HARMLESS, ConnectedAxis, connect_axes, speeds_to_arrive_together
 from eddyscan.devices.drivers.zaber_link import Told, ZaberLink
 from eddyscan.devices.drivers.zaber_paths import Follower, Looker, SteeredChain, TimedPoints
 from eddyscan.devices.drivers.zaber_settings import ZaberStageSettings
@@ -17,7 +17,6 @@ from eddyscan.devices.protocols import Axis, Clock, Identity, PathSample, TimedP
 
 LOOK_S = 0.1  # of the rig's clock, between two looks at a moving stage
 SOON_S = 0.002
-HARMLESS = ("--", "NI", "NC", "NJ", "ND")
 
 
 class ZaberStage:

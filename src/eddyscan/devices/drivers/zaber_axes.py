@@ -18,6 +18,7 @@ SPEED_UNIT = 1.6384  # native speed = microsteps/s x this (vendor's documented c
 ACCELERATION_UNIT = 1.6384 / 1e4
 READ_AT_CONNECT = ("deviceid", "system.serial", "version", "limit.min", "limit.max", "maxspeed", "accel", "resolution")
 DEVICE_WIDE = ("deviceid", "system.serial", "version")
+HARMLESS = ("--", "NI", "NC", "NJ", "ND")
 MEANINGS = {
     "FS": "a stall (FS)",
     "FQ": "an encoder error (FQ)",

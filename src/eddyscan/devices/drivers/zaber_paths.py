@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from eddyscan.core.frames import Array
-from eddyscan.devices.drivers.zaber_axes import ConnectedAxis
+from eddyscan.devices.drivers.zaber_axes import HARMLESS, ConnectedAxis
 from eddyscan.devices.drivers.zaber_link import Told, ZaberLink
 from eddyscan.devices.protocols import Clock, PathSample, TimedPath
 
@@ -73,6 +73,8 @@ class SteeredChain:
     def step(self) -> PathSample:
         """Run one steering round."""
         times, positions, self.told = self._looker.look(self._moving)
+        if _faulty(self.told):
+            return PathSample(times, positions, moving=True)
         now = self._clock.now()
         self._round_s = 0.7 * self._round_s + 0.3 * min(max(now - self._last, 1e-3), 0.2)
         self._last = now
@@ -128,6 +130,8 @@ class TimedPoints:
         n = max(int(np.ceil(path.duration_s / grid_s)), 1)
         self._ends_s = np.round(np.linspace(0.0, path.duration_s, n + 1)[1:], 3)
         self._next = 0
+        for axis in looker.axes:  # the library refuses points while an old flag stands
+            looker.link.tell(*axis.where, "warnings clear")
         self._device = looker.axes[0].table.device
         self._sequence: Any = looker.link.device_of(self._device).pvt.get_sequence(1)
         self._call("pvt setup", lambda: self._sequence.setup_live(*[a.table.axis for a in looker.axes]))
@@ -139,6 +143,8 @@ class TimedPoints:
     def step(self) -> PathSample:
         """Look at the axes and send the points of the coming half second."""
         times, positions, self.told = self._looker.look(self._moving)
+        if _faulty(self.told):
+            return PathSample(times, positions, moving=True)
         self._feed(self._clock.now() - self.began_s + AHEAD_S)
         moving = self._next < len(self._ends_s) or any(answer.busy for answer in self.told)
         if not moving:
@@ -164,3 +170,8 @@ class TimedPoints:
         speeds = [Measurement(axes[i].native_speed(float(velocity[i]))) for i in self._which]
         duration = Measurement(round(1e3 * (end - begin)))
         self._call("pvt point", lambda: self._sequence.point(counts, speeds, duration))
+
+
+def _faulty(told: Sequence[Told]) -> bool:
+    """Return whether an answer carries a fault: then nothing more is sent, the stage tells and stops."""
+    return any(answer.warning not in HARMLESS for answer in told)

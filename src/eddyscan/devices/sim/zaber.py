@@ -165,7 +165,7 @@ class ZaberSimulator:
         now = self.clock.now()
         axis = next(a for a in self.axes if a.model.name == fault.axis)
         if fault.kind == "stall":
-            axis.stall_at = axis.state(now)[0] if fault.at is None else axis.count_of(fault.at)
+            axis.stall_at(now, fault.at)
         elif fault.kind == "driver-off":
             axis.halt(now)
             axis.driver_on = False

@@ -37,7 +37,7 @@ class AxisState:
             "maxspeed": round(model.max_speed / model.microstep * SPEED_UNIT),
             "accel": max(round(model.acceleration / model.microstep * ACCELERATION_UNIT), 1),
         }
-        self.stall_at: float | None = None
+        self._stall: tuple[float, float] | None = None
         self.busy = False
         self.direction = 1.0
         self._rng = rng
@@ -80,12 +80,13 @@ class AxisState:
         """Bring flags and business up to `now`; return True when the axis has just come to rest."""
         if not self.busy:
             return False
-        count, speed = self.state(now)
-        if self.stall_at is not None and (count - self.stall_at) * np.sign(speed or 1.0) >= 0:
-            self.halt(now, at=self.stall_at)
-            self.flags |= {"FS", "NI"}
-            self.stall_at = None
-            return True
+        if self._stall is not None:
+            place, side = self._stall
+            if (self.state(now)[0] - place) * side >= 0:
+                self.halt(now, at=place)
+                self.flags |= {"FS", "NI"}
+                self._stall = None
+                return True
         if self._path is None and now - self._began >= self._motion.duration:
             self.busy = False
             if self.homing:
@@ -139,6 +140,12 @@ class AxisState:
         count, velocity = self.state(now)
         self._path = None
         self._begin(brake(count, velocity, self.settings["accel"] / ACCELERATION_UNIT), now)
+
+    def stall_at(self, now: float, reading: float | None) -> None:
+        """Let the axis stall when it next comes to a stage reading (None: where it is, when it moves)."""
+        count = self.state(now)[0]
+        place = count if reading is None else self.count_of(reading)
+        self._stall = (place, float(np.sign(place - count)))
 
     def power_cycle(self, now: float) -> None:
         """Lose the reference, as when the supply was cut."""

@@ -62,7 +62,10 @@ class Device:
     def update(self, now: float) -> list[int]:
         """Bring all axes up to `now`; return the numbers of those that have just come to rest."""
         self.pvt.update(now)
-        return [number for number, axis in enumerate(self.axes, 1) if axis.update(now)]
+        rested = [number for number, axis in enumerate(self.axes, 1) if axis.update(now)]
+        if any("FS" in axis.flags for axis in self.axes):
+            self.pvt.disable(now)
+        return rested
 
     def busy(self, axis: int) -> bool:
         """Return whether the axis (0: any) moves."""
