@@ -9,6 +9,7 @@ from eddyscan.physics.conductor import Conductor, Layer, skin_depth_mm
 from eddyscan.physics.impedance import impedance_change_ohm, impedance_ohm, least_lift_off_mm
 from eddyscan.physics.lift_off import LiftOffCurve
 from eddyscan.physics.placed import PlacedSlot, slots_change_ohm
+from eddyscan.physics.pose import PoseCurve, curved_lift_off_mm, effective_radius_mm, too_curved
 from eddyscan.physics.slot import Slot, slot_warnings, to_slot_frame
 from eddyscan.physics.slot_solver import SlotSolver, slot_change_ohm
 from eddyscan.physics.tables import SlotTable, build_table, slot_table, table_grid
@@ -19,11 +20,14 @@ __all__ = [
     "Layer",
     "LiftOffCurve",
     "PlacedSlot",
+    "PoseCurve",
     "Slot",
     "SlotSolver",
     "SlotTable",
     "air_inductance_h",
     "build_table",
+    "curved_lift_off_mm",
+    "effective_radius_mm",
     "impedance_change_ohm",
     "impedance_ohm",
     "least_lift_off_mm",
@@ -34,4 +38,5 @@ __all__ = [
     "slots_change_ohm",
     "table_grid",
     "to_slot_frame",
+    "too_curved",
 ]

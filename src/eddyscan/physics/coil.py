@@ -96,7 +96,7 @@ def winding_integral(coil: Coil, q: NDArray[Any]) -> NDArray[Any]:
     integral : (...) same kind as q [m^2]
     """
     span = float(np.abs(q).max(initial=0.0)) * (coil.outer_m - coil.inner_m)
-    r, w = gauss_panels(np.linspace(coil.inner_m, coil.outer_m, 2 + int(span / 12)), 12)
+    r, w = gauss_panels(np.linspace(coil.inner_m, coil.outer_m, 2 + int(span / 36)), 24)
     flat = q.ravel()
     bessel = jv(1, flat[:, None] * r) if np.iscomplexobj(flat) else j1(flat[:, None] * r)
     return np.asarray(bessel @ (w * r)).reshape(q.shape)
@@ -112,11 +112,11 @@ def wave_numbers(coil: Coil, *, reach_m: float = 0.0, finest_m: float | None = N
 
     Panels grow geometrically from zero, so slow features (thick plates, large
     skin depths) are resolved, then follow the oscillation of the Bessel
-    functions at `outer radius + reach_m`, up to a cut-off where the squared
-    source has fallen by 10 orders (or by exp(-k finest_m)).
+    functions at `outer radius + reach_m`, up to a cut-off where the
+    impedance is converged to 1e-9 (or exp(-k finest_m) has fallen as far).
     """
     largest = coil.outer_m + 0.4 * reach_m
-    top = max(60.0 / coil.inner_m if coil.inner_m > 0.15 * coil.outer_m else 400.0 / coil.outer_m, 120.0 / coil.outer_m)
+    top = 60.0 / coil.mean_radius_m
     if finest_m is not None and finest_m > 0:
         top = min(top, max(40.0 / finest_m, 20.0 / coil.outer_m))
     step = 4.0 / largest

@@ -95,12 +95,13 @@ def power_spectrum(coil: Coil, k: Array, tilt_deg: float = 0.0) -> Array:
     sine, cosine = np.sin(np.radians(abs(tilt_deg))), np.cos(np.radians(tilt_deg))
     depth = 0.5 * coil.length_m * cosine + coil.outer_m * sine
     count = 16 + int(1.5 * k.max() * coil.outer_m * sine + k.max() * coil.length_m * sine)
+    count += count % 2
     total = np.zeros(len(k))
-    for phi in (np.arange(count) + 0.5) * np.pi / count:
+    for phi in (np.arange(count // 2) + 0.5) * np.pi / count:
         q = k * (cosine + 1j * sine * np.cos(phi))
         amplitude = winding_integral(coil, q) * np.exp(-k * depth) * 2 * np.sinh(0.5 * q * coil.length_m) / q
         total += np.abs(amplitude) ** 2
-    return total / count
+    return 2 * total / count
 
 
 def laplace_sum(k: Array, spectrum: ComplexArray, height_m: Array) -> ComplexArray:
