@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from eddyscan.core.frames import Array
-from eddyscan.planning.families import even_levels, span_inside
 from eddyscan.planning.fields import Gradients, Seed, distance_field, gradients
 from eddyscan.planning.holes import Filled, fill_holes
-from eddyscan.planning.levels import Line, clipped, level_lines
 from eddyscan.planning.seeds import seeds_for
 from eddyscan.planning.smooth import SmoothSurface, smoothed
 from eddyscan.planning.topology import Edges, edges_of
@@ -42,22 +40,6 @@ def distance_from(mesh: FieldMesh, seed: Seed) -> Array:
     """Return the signed distance (V',) [mm] from a seed over the filled mesh."""
     rough = distance_field(mesh.calculus, seed)
     return exact_distance(mesh.surface, rough, seed.rays, mesh.filled.edge_mm)
-
-
-def geodesic_lines(mesh: FieldMesh, field: Array, guard: Array, pitch_mm: float) -> list[Line]:
-    """Return level lines of a distance field at an even pitch, cut to the guarded region.
-
-    Parameters
-    ----------
-    field : (V',) [mm], on the filled mesh
-    guard : (V,), of the patch; positive inside
-    """
-    whole = guarded(mesh, guard)
-    if not (whole > 0).any():
-        return []
-    levels = even_levels(*span_inside(field, whole, mesh.edges), pitch_mm)
-    lines = level_lines(mesh.filled.vertices, mesh.filled.faces, mesh.edges, field, levels, whole)
-    return [piece for line in lines for piece in clipped(line)]
 
 
 def guarded(mesh: FieldMesh, guard: Array) -> Array:

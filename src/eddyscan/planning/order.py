@@ -28,4 +28,4 @@ def _begun_near(stroke: Stroke, at: np.ndarray) -> Stroke:
     if k == 0:
         return stroke
     points, normals = (np.concatenate([rows[k:-1], rows[: k + 1]]) for rows in (stroke.points, stroke.normals))
-    return Stroke(points, normals, stroke.s_mm, stroke.path, stroke.path_normals, stroke.level, closed=True)
+    return Stroke(points, normals, stroke.s_mm, stroke.level, closed=True)

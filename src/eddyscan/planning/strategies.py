@@ -1,37 +1,81 @@
-"""The strategies of the technique, each a field on the surface and its levels."""
+"""The strategies of the technique: each a field on the surface whose levels are the rows."""
 
 from __future__ import annotations
 
-from eddyscan.core.frames import Array
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.technique import Plan
 from eddyscan.planning.families import even_levels, plane_levels, ring_field, span_inside
-from eddyscan.planning.geodesic import distance_from, field_mesh, geodesic_lines
+from eddyscan.planning.geodesic import distance_from, field_mesh, guarded
 from eddyscan.planning.levels import Line, clipped, level_lines
+from eddyscan.planning.loops import fitted_loops
 from eddyscan.planning.smooth import SmoothSurface
-from eddyscan.planning.topology import edges_of
+from eddyscan.planning.topology import Edges, edges_of
 
 # Rows along x are cut by planes of constant y.
 ALONG_X = 1
 
 
-def lines_for(surface: SmoothSurface, settings: Plan, guard: Array) -> list[Line]:
-    """Return the lines of the rows, ordered, cut to where `guard` (V,) is positive."""
+@dataclass(frozen=True)
+class RowField:
+    """A field on a mesh, where it counts, and the levels that become rows.
+
+    Attributes
+    ----------
+    vertices : (V, 3) [mm], faces : (F, 3), edges : Edges
+        The patch's own vertices and faces come first.
+    field : (V,), guard : (V,) positive where rows may run
+    levels : (L,) ascending
+    """
+
+    vertices: Array
+    faces: IntArray
+    edges: Edges
+    field: Array
+    guard: Array
+    levels: Array
+
+    def lines_at(self, levels: Array) -> list[Line]:
+        """Return the level lines, ordered by level and cut to the guarded region."""
+        lines = level_lines(self.vertices, self.faces, self.edges, self.field, levels, self.guard)
+        return [piece for line in lines for piece in clipped(line)]
+
+    def rows(self, settings: Plan) -> list[Line]:
+        """Return the lines of all rows; closed ones fitted to a whole number of steps."""
+        lines = self.lines_at(self.levels)
+        if settings.strategy == "grid":
+            return lines
+        return fitted_loops(lines, self.lines_at, step_mm=settings.step_mm, pitch_mm=settings.pitch_mm)
+
+
+def row_fields(surface: SmoothSurface, settings: Plan, guard: Array) -> Iterator[RowField]:
+    """Yield the ways to lay rows on a patch, the most promising first; nothing when the guard leaves nothing."""
     inside = guard > 0
     if not inside.any():
-        return []
+        return
     if settings.strategy == "geodesic":
-        mesh = field_mesh(surface)
-        field = distance_from(mesh, next(mesh.seeds))
-        return geodesic_lines(mesh, field, guard, settings.pitch_mm)
+        yield from _geodesic(surface, settings, guard)
+        return
     edges = edges_of(surface.faces)
+    field = ring_field(surface, inside) if settings.strategy == "encircle" else surface.vertices[:, ALONG_X]
+    low, high = span_inside(field, guard, edges)
     if settings.strategy == "encircle":
-        field = ring_field(surface, inside)
-        levels = even_levels(0.0, span_inside(field, guard, edges)[1], settings.pitch_mm)
+        levels = even_levels(0.0, high, settings.pitch_mm)
     elif settings.strategy == "grid":
-        field = surface.vertices[:, ALONG_X]
-        levels = even_levels(*span_inside(field, guard, edges), settings.pitch_mm)
+        levels = even_levels(low, high, settings.pitch_mm)
     else:
-        field = surface.vertices[:, ALONG_X]
-        levels = plane_levels(surface, ALONG_X, settings.pitch_mm, inside, span_inside(field, guard, edges))
-    lines = level_lines(surface.vertices, surface.faces, edges, field, levels, guard)
-    return [piece for line in lines for piece in clipped(line)]
+        levels = plane_levels(surface, ALONG_X, settings.pitch_mm, inside, (low, high))
+    yield RowField(surface.vertices, surface.faces, edges, field, guard, levels)
+
+
+def _geodesic(surface: SmoothSurface, settings: Plan, guard: Array) -> Iterator[RowField]:
+    mesh = field_mesh(surface)
+    whole = guarded(mesh, guard)
+    if not (whole > 0).any():
+        return
+    for seed in mesh.seeds:
+        field = distance_from(mesh, seed)
+        levels = even_levels(*span_inside(field, whole, mesh.edges), settings.pitch_mm)
+        yield RowField(mesh.filled.vertices, mesh.filled.faces, mesh.edges, field, whole, levels)

@@ -8,6 +8,7 @@ import numpy as np
 
 from eddyscan.core.frames import Array
 from eddyscan.planning.levels import Line
+from eddyscan.planning.loops import steps_in_loop
 from eddyscan.planning.smooth import SmoothSurface
 
 TRIM_OF_STEP = 0.05
@@ -22,7 +23,6 @@ class Stroke:
     ----------
     points, normals : (N, 3) where readings are taken [mm], unit outward
     s_mm : (N,) arc length from the first point
-    path, path_normals : (M, 3) the line in between, finely
     level : float, of the row's field
     closed : bool
         The last reading repeats the first: the sweep has no gap and drift shows.
@@ -31,22 +31,13 @@ class Stroke:
     points: Array
     normals: Array
     s_mm: Array
-    path: Array
-    path_normals: Array
     level: float
     closed: bool
-
-    @property
-    def length_mm(self) -> float:
-        """Return the length [mm] of the path."""
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
 
     def reversed(self) -> Stroke:
         """Return the stroke run the other way."""
         s = self.s_mm[-1] - self.s_mm[::-1]
-        return Stroke(
-            self.points[::-1], self.normals[::-1], s, self.path[::-1], self.path_normals[::-1], self.level, self.closed
-        )
+        return Stroke(self.points[::-1], self.normals[::-1], s, self.level, self.closed)
 
 
 def surface_distance(p: Array, q: Array, n_p: Array, n_q: Array) -> Array:
@@ -66,8 +57,7 @@ def stroke_from_line(line: Line, surface: SmoothSurface, step_mm: float) -> Stro
     to 5 % of a step is left at each end when that brings the steps closer to
     what was asked.
     """
-    path, path_normals = _lifted(line, surface)
-    length = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    length = np.linalg.norm(np.diff(_lifted(line, surface), axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(length)])
     if s[-1] < 0.02 * step_mm:
         return None
@@ -76,18 +66,17 @@ def stroke_from_line(line: Line, surface: SmoothSurface, step_mm: float) -> Stro
     t = (at - s[segment]) / np.maximum(length[segment], 1e-12)
     flat = line.points[segment] + t[:, None] * (line.points[segment + 1] - line.points[segment])
     points, normals = surface.at(flat, line.face[segment])
-    return Stroke(points, normals, at - at[0], path, path_normals, line.level, line.closed)
+    return Stroke(points, normals, at - at[0], line.level, line.closed)
 
 
-def _lifted(line: Line, surface: SmoothSurface) -> tuple[Array, Array]:
+def _lifted(line: Line, surface: SmoothSurface) -> Array:
     face = np.concatenate([line.face, line.face[-1:]])
-    return surface.at(line.points, face)
+    return surface.at(line.points, face)[0]
 
 
 def _stations(length: float, step: float, *, closed: bool) -> Array:
     if closed:
-        n = max(3, round(length / step))
-        return np.linspace(0.0, length, n + 1)
+        return np.linspace(0.0, length, steps_in_loop(length, step) + 1)
     n = max(1, round(length / step))
     over = length - n * step * (1 + SPACING_OF_STEP)
     trim = float(np.clip(over / 2, 0.0, TRIM_OF_STEP * step))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from eddyscan.core.frames import Array, BoolArray, IntArray
+from eddyscan.core.frames import Array, IntArray
 from eddyscan.planning.strokes import Stroke, surface_distance
 
 SAMPLES_PER_FOOTPRINT = 40
@@ -17,12 +17,25 @@ NEIGHBOURS = 12
 
 @dataclass(frozen=True)
 class Samples:
-    """Area-uniform spots of the region: points, normals (N, 3), their faces (N,), area each speaks for."""
+    """Area-uniform spots of a mesh.
+
+    Attributes
+    ----------
+    points, normals : (N, 3), face : (N,), weight : (N, 3) barycentric
+    area_mm2 : float, that each speaks for
+    reach_mm : float, half the swept width
+    """
 
     points: Array
     normals: Array
     face: IntArray
+    weight: Array
     area_mm2: float
+    reach_mm: float
+
+    def of(self, values: Array, faces: IntArray) -> Array:
+        """Return a vertex field (V,) at the samples (N,); infinite values count as very large."""
+        return np.asarray(np.einsum("nk,nk->n", self.weight, np.minimum(values, 1e6)[faces[self.face]]))
 
 
 def dense_samples(vertices: Array, faces: IntArray, normals: Array, footprint_mm: float) -> Samples:
@@ -41,7 +54,7 @@ def dense_samples(vertices: Array, faces: IntArray, normals: Array, footprint_mm
     points = np.einsum("nk,nkj->nj", weight, vertices[faces[face]])
     normal = np.einsum("nk,nkj->nj", weight, normals[faces[face]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    return Samples(points, normal, face, total / n)
+    return Samples(points, normal, face, weight, total / n, footprint_mm / 2 * (1 + 1e-3))
 
 
 def distance_to_strokes(samples: Samples, strokes: list[Stroke], fine_mm: float) -> Array:
@@ -75,15 +88,35 @@ def _foot(p: Array, a: Array, b: Array, n_a: Array, n_b: Array) -> tuple[Array, 
 
 
 def densified(stroke: Stroke, fine_mm: float) -> tuple[Array, Array, Array]:
-    """Return a stroke's path between its first and last reading, at about `fine_mm`: points, normals, tangents."""
-    path = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(stroke.path, axis=0), axis=1))])
-    trim = 0.0 if stroke.closed else max(0.0, (path[-1] - stroke.s_mm[-1]) / 2)
-    s = np.linspace(trim, path[-1] - trim, max(2, int(np.ceil((path[-1] - 2 * trim) / fine_mm)) + 1))
-    points = np.stack([np.interp(s, path, stroke.path[:, k]) for k in range(3)], axis=1)
-    normals = np.stack([np.interp(s, path, stroke.path_normals[:, k]) for k in range(3)], axis=1)
+    """Return the way swept from reading to reading, every `fine_mm` or so: points, normals, tangents.
+
+    Between two readings the probe runs straight on the surface: a cubic that
+    leaves and arrives in the tangent planes (Hermite).
+    """
+    p, n = stroke.points, stroke.normals
+    chord = np.diff(p, axis=0)
+    length = np.maximum(surface_distance(p[:-1], p[1:], n[:-1], n[1:]), 1e-12)
+    m = max(1, int(np.ceil(float(length.max()) / fine_mm)))
+    t = (np.arange(m) / m)[:, None]
+    leave, arrive = _within(chord, n[:-1], length), _within(chord, n[1:], length)
+    points = _hermite(p[:-1], leave, p[1:], arrive, t).reshape(-1, 3)
+    normals = (n[:-1, None] + t * np.diff(n, axis=0)[:, None]).reshape(-1, 3)
+    points, normals = np.concatenate([points, p[-1:]]), np.concatenate([normals, n[-1:]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     tangents = np.gradient(points, axis=0)
     return points, normals, tangents / np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
+
+
+def _within(chord: Array, normal: Array, length: Array) -> Array:
+    flat = chord - np.einsum("nk,nk->n", chord, normal)[:, None] * normal
+    return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12) * length[:, None])
+
+
+def _hermite(p: Array, dp: Array, q: Array, dq: Array, t: Array) -> Array:
+    p, dp, q, dq = (v[:, None] for v in (p, dp, q, dq))
+    return np.asarray(
+        (2 * t**3 - 3 * t**2 + 1) * p + (t**3 - 2 * t**2 + t) * dp + (3 * t**2 - 2 * t**3) * q + (t**3 - t**2) * dq
+    )
 
 
 def spacings(strokes: list[Stroke]) -> Array:
@@ -118,8 +151,3 @@ def row_distances(strokes: list[Stroke], pitch_mm: float, *, probes: int = 4000)
     sides = [np.where(apart & side, d, np.inf).min(axis=1) for side in (lateral > 0, lateral < 0)]
     both = np.concatenate(sides)
     return np.asarray(both[np.isfinite(both)])
-
-
-def inside_mask(guard: Array, faces: IntArray, samples: Samples, weight_of: Array) -> BoolArray:
-    """Return which samples (N,) lie where the guard field (V,) is positive; `weight_of` (N, 3) barycentric."""
-    return np.asarray(np.einsum("nk,nk->n", weight_of, guard[faces[samples.face]]) > 0)
