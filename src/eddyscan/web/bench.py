@@ -228,7 +228,11 @@ class Bench:
 
     def _on_stopped(self, message: dict[str, Any], job: Job) -> None:
         self._finish("stopped", message["message"])
-        took = "" if self.stop_seconds is None else f" Axes stopped {1000 * self.stop_seconds:.0f} ms after the click."
+        took = (
+            ""
+            if self.stop_seconds is None
+            else f" The stage confirmed {1000 * self.stop_seconds:.0f} ms after the click."
+        )
         self.tell(message["message"] + took, "warning")
 
     def _on_failed(self, message: dict[str, Any], job: Job) -> None:

@@ -124,7 +124,7 @@ def _align(inspection: Inspection, _: dict[str, dict[str, Any]]) -> str:
         return ""
     pose = read_json(path)
     x, y, z = (row[3] for row in pose["T_stage_part"][:3])
-    return f"part corner at {x:.1f}, {y:.1f}, {z:.1f} mm; {pose.get('how', '')}".rstrip("; ")
+    return f"corner at {x:.1f}, {y:.1f}, {z:.1f} mm: {pose.get('how', '')}".rstrip(": ")
 
 
 def _record(inspection: Inspection, summaries: dict[str, dict[str, Any]]) -> str:

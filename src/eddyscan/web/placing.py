@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,24 +13,27 @@ from eddyscan.core.frames import Array, ComplexArray, IntArray, apply, checked_t
 from eddyscan.core.record import Reading, ScanRecord
 from eddyscan.inspection import Inspection, read_json
 
+if TYPE_CHECKING:
+    from eddyscan.physics.sound_response import SoundResponse
+
 COLUMNS = ("row", "point", "time_s", "x_mm", "y_mm", "z_mm", "resistance_ohm", "reactance_ohm", "flag", "lift_off_mm")
 DECIMALS = (0, 0, 3, 3, 3, 3, 9, 9, 0, 4)
-Spots = dict[tuple[int, int], tuple[Array, Array]]
 
 
 class Placing:
-    """Places readings of one folder's scan in the part frame.
+    """Places readings of one folder's scan in the part frame and tells the coil's lift-off.
 
-    Lift-off here is the one the axes tell: the measured position's distance from
-    the plan's spot along its normal. What the coil tells comes with the analysis.
+    The lift-off is the analysis's curve of sound metal at the planned tilt; the
+    corrections that need the whole scan (curvature, drift) come with the analysis.
     """
 
     def __init__(self, folder: Path) -> None:
         self._inspection = Inspection(folder)
         self._T_part_stage: Array | None = None
-        self._spots: Spots = {}
+        self._tilt_deg: dict[tuple[int, int], float] = {}
+        self._response: SoundResponse | None = None
 
-    def rows(self, readings: Sequence[Reading]) -> list[list[float | None]]:
+    def rows(self, readings: Sequence[Reading]) -> list[list[float]]:
         """Return one list per reading in the order of COLUMNS, rounded for the wire."""
         table = self._placed(
             keys=np.array([(r.row, r.point) for r in readings], dtype=np.int64),
@@ -43,9 +46,8 @@ class Placing:
 
     def table(self, record: ScanRecord) -> Array:
         """Return a record as (N, len(COLUMNS)), NaN where unknown."""
-        keys = np.stack([record.row, record.point], axis=1)
         return self._placed(
-            keys=keys,
+            keys=np.stack([record.row, record.point], axis=1),
             time_s=record.time_s,
             stage_mm=record.stage_mm,
             impedance_ohm=record.impedance_ohm,
@@ -56,26 +58,35 @@ class Placing:
         self, *, keys: IntArray, time_s: Array, stage_mm: Array, impedance_ohm: ComplexArray, flag: IntArray
     ) -> Array:
         if self._T_part_stage is None:
-            self._T_part_stage, self._spots = self._alignment(), self._planned_spots()
+            path = self._inspection.file("record", "alignment.json")
+            self._T_part_stage = invert(checked_transform(read_json(path)["T_stage_part"], str(path)))
+            self._learn_sound_metal()
         at = apply(self._T_part_stage, stage_mm)
-        lift_off = np.array([self._lift_off(int(row), int(p), at[k]) for k, (row, p) in enumerate(keys)])
+        lift_off = self._lift_off_mm(keys, impedance_ohm)
         columns: list[Any] = [keys, time_s, at, impedance_ohm.real, impedance_ohm.imag, flag, lift_off]
         return np.column_stack(columns).astype(np.float64)
 
-    def _lift_off(self, row: int, point: int, at: Array) -> float:
-        spot = self._spots.get((row, point))
-        return float("nan") if spot is None else float((at - spot[0]) @ spot[1])
+    def _lift_off_mm(self, keys: IntArray, impedance_ohm: ComplexArray) -> Array:
+        lift_off = np.full(len(keys), np.nan)
+        good = np.isfinite(impedance_ohm)
+        if self._response is None or not good.any():
+            return lift_off
+        tilt = np.array([self._tilt_deg.get((int(row), int(point)), 0.0) for row, point in keys[good]])
+        lift_off[good] = self._response.project(impedance_ohm[good], tilt).lift_off_mm
+        return lift_off
 
-    def _alignment(self) -> Array:
-        path = self._inspection.file("record", "alignment.json")
-        return invert(checked_transform(read_json(path)["T_stage_part"], str(path)))
-
-    def _planned_spots(self) -> Spots:
+    def _learn_sound_metal(self) -> None:
+        from eddyscan.analysis.inspect import response_for
+        from eddyscan.analysis.readings import air_reading
         from eddyscan.formats.plans import read_plan
+        from eddyscan.formats.records import read_record
 
         try:
             plan = read_plan(self._inspection.file("plan", "plan.json"))
+            scan = np.flatnonzero(plan.is_scan)
+            self._tilt_deg = {(int(plan.row[k]), int(plan.point[k])): float(plan.tilt_deg[k]) for k in scan}
+            air = air_reading(read_record(self._inspection.file("record", "record.sqlite")).meta)
+            most = float(plan.tilt_deg[scan].max())
+            self._response = response_for(self._inspection.technique(), air, largest_tilt_deg=most)
         except EddyscanError:
-            return {}
-        scan = np.flatnonzero(plan.is_scan)
-        return {(int(plan.row[k]), int(plan.point[k])): (plan.surface_mm[k], plan.normal[k]) for k in scan}
+            self._response = None  # the readings are shown without lift-off

@@ -83,16 +83,15 @@ def record(inspection: Inspection) -> bytes:
 
 def cscan(inspection: Inspection) -> bytes:
     """Return the C-scan's channels per vertex and the analysed values per reading."""
-    path = _there(inspection.file("cscan", "readings.npz"))
-    arrays: dict[str, Any] = {}
-    with np.load(path) as kept:
-        for name in kept.files:
-            if name.startswith("channel "):
-                arrays[name] = f4(kept[name])
-        arrays["covered"] = kept["covered"].astype(np.uint8)
-        arrays["lift_off_mm"] = f4(kept["lift_off_mm"])
+    from eddyscan.formats.record_ply import read_cscan_ply
+
+    mapped = read_cscan_ply(_there(inspection.file("cscan", "cscan.ply")))
+    arrays: dict[str, Any] = {f"channel {name}": f4(values) for name, values in mapped.channels.items()}
+    arrays["covered"] = mapped.covered.astype(np.uint8)
+    with np.load(_there(inspection.file("cscan", "readings.npz"))) as kept:
         residual = kept["residual_ohm"]
-        arrays["residual_re_ohm"], arrays["residual_im_ohm"] = f4(residual.real), f4(residual.imag)
+        arrays["lift_off_mm"] = f4(kept["lift_off_mm"])
+    arrays["residual_re_ohm"], arrays["residual_im_ohm"] = f4(residual.real), f4(residual.imag)
     return packed(arrays, {})
 
 

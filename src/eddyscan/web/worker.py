@@ -100,14 +100,25 @@ class Worker:
             ending = {"event": "stopped", "message": str(error)}
         except KeyboardInterrupt:
             ending = {"event": "stopped", "message": f"{step} was stopped; the folder is as it was before."}
-        except EddyscanError as error:
-            ending = {"event": "failed", "message": str(error), "kind": type(error).__name__}
         except Exception as error:
-            traceback.print_exc()
-            ending = {"event": "failed", "kind": type(error).__name__, "message": unforeseen(step, error)}
+            ending = self._ending_of(step, error)
         finally:
             self._busy = None
         self._outbox.end(ending)
+
+    def _ending_of(self, step: str, error: Exception) -> dict[str, Any]:
+        kind = type(error).__name__
+        if self._control is not None and self._control.stopped:
+            # A move cut short by Stop ends in the driver's own words; it is a stop all the same.
+            return {
+                "event": "stopped",
+                "message": "the scan was stopped; everything read so far is kept.",
+                "kind": kind,
+            }
+        if isinstance(error, EddyscanError):
+            return {"event": "failed", "message": str(error), "kind": kind}
+        traceback.print_exception(error)
+        return {"event": "failed", "kind": kind, "message": unforeseen(step, error)}
 
     def _run(self, step: str, folder: Path, job: dict[str, Any]) -> dict[str, Any]:
         options: dict[str, Any] = {"progress": self._outbox.progress, "control": self._control}

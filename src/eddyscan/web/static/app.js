@@ -98,7 +98,7 @@ class App {
     at("stop").classList.add("pressed");
     setTimeout(() => at("stop").classList.remove("pressed"), 400);
     this.live.stop().catch((fault) => this.alarm(`${fault.message} USE THE EMERGENCY STOP.`));
-    if (!this.running) say("Stop sent. Nothing was moving.");
+    if (!this.running) say("Stop sent; nothing was moving.");
   }
 
   pauseOrGo() {
@@ -129,7 +129,7 @@ class App {
     this.pages = news.pages;
     if (this.revision !== null && this.revision !== news.revision) this.refresh().catch((fault) => say(fault.message, "error"));
     this.revision = news.revision;
-    if (before && before.active && this.job && !this.job.active && this.job.state === "failed") say(this.job.message, "error");
+    if (before && before.active && this.job && !this.job.active && this.job.state === "failed" && this.room?.step !== "record") say(this.job.message, "error");
     this.room?.news?.(news);
   }
 
@@ -188,7 +188,7 @@ class App {
     const states = { running: "", paused: " – PAUSED", stopping: " – STOPPING", stopped: " – stopped", failed: " – failed" };
     const count = job.total > 1 && Number.isInteger(job.total) ? ` ${Math.round(job.done)} of ${job.total}` : "";
     this.bar.words.textContent = `${job.title}${job.active && job.what ? `: ${job.what}${count}` : ""}${states[job.state] || ""}`;
-    const stopped = news.stop_ms !== null && !job.active ? `axes stopped ${news.stop_ms.toFixed(0)} ms after Stop` : "";
+    const stopped = news.stop_ms !== null && !job.active ? `stage confirmed Stop after ${news.stop_ms.toFixed(0)} ms` : "";
     this.bar.left.textContent = stopped || (job.active && job.seconds_left !== null ? `${duration(job.seconds_left)} left` : "");
     if (!this.bar.words.isConnected) fill(at("progress"), this.bar.words, h("div", { class: "track" }, this.bar.fill), this.bar.left);
   }

@@ -120,10 +120,13 @@ export class Bench {
   }
 
   mainButton(step, state) {
+    const options = { kind: "main", id: `do-${step.name}` };
+    if (step.name === "record" && state === "done") return this.app.stepButton("Every point is read", ["record"], { ...options, disabled: true });
     const resumes = step.name === "record" && ["partial", "stopped", "failed"].includes(state);
-    const again = ["done", "stale"].includes(state) ? " again" : "";
+    const again = ["done", "stale"].includes(state) && step.name !== "record" ? " again" : "";
     const label = resumes ? "Go on with the scan" : LABELS[step.name] + again;
-    return this.app.stepButton(label, [RUNS[step.name]], { kind: "main", id: `do-${step.name}` });
+    const asks = step.name === "views" && state === "done" ? "This replaces the views. Press again" : "";
+    return this.app.stepButton(label, [RUNS[step.name]], { ...options, asks });
   }
 
   // Everything that is missing up to the plan, or all after the scan: never motion without its own button.

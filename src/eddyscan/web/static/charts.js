@@ -38,7 +38,7 @@ export class Strip {
   }
 
   draw({ time, values, count, title, unit, limits = [], marked = null, seconds = 0, scale = 1 }) {
-    const { c, width, height } = pen(this.canvas, 190);
+    const { c, width, height } = pen(this.canvas, 170);
     this.canvas.setAttribute("aria-label", `strip chart: ${title} [${unit}] against time`);
     c.fillStyle = css("--soft");
     c.fillText(`${title} [${unit}]`, 8, 15);
@@ -145,7 +145,7 @@ export class Plane {
   }
 
   draw({ re, im, count, marked = null }) {
-    const { c, width, height } = pen(this.canvas, 270);
+    const { c, width, height } = pen(this.canvas, 250);
     const centre = [width / 2, height / 2];
     const zero = this.null || middleOf(re, im, count);
     const first = this.keep ? Math.max(0, count - this.keep) : 0;

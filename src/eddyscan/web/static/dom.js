@@ -48,6 +48,11 @@ export function button(label, work, options = {}) {
   element.disabled = Boolean(options.disabled);
   element.addEventListener("click", async () => {
     if (element.dataset.busy) return;
+    if (options.asks && element.textContent !== options.asks) {
+      element.textContent = options.asks;
+      setTimeout(() => (element.textContent = label), 4000);
+      return;
+    }
     element.dataset.busy = "yes";
     element.setAttribute("aria-busy", "true");
     try {
@@ -65,7 +70,8 @@ export function button(label, work, options = {}) {
 // A message at the bottom of the page; errors stay until they are closed.
 export function say(message, level = "info") {
   const place = document.getElementById("messages");
-  const note = h("div", { class: `message ${level}`, role: level === "error" ? "alert" : "status" }, h("p", {}, message));
+  for (const other of [...place.children]) if (other.dataset.text === message) other.remove();
+  const note = h("div", { "data-text": message, class: `message ${level}`, role: level === "error" ? "alert" : "status" }, h("p", {}, message));
   note.append(h("button", { type: "button", class: "plain", "aria-label": "close message", onclick: () => note.remove() }, "✕"));
   while (place.children.length > 3) place.firstChild.remove();
   place.append(note);

@@ -72,7 +72,6 @@ export class Plan {
 
   leave() {
     clearInterval(this.timer);
-    this.bench.picture.viewer.set("probe", null);
-    this.bench.picture.viewer.set("probe tip", null);
+    this.bench.picture.viewer.setProbe(null);
   }
 }

@@ -46,7 +46,7 @@ export class Report {
     const other = await ask("overview", { name });
     this.single();
     this.second = new Viewer(name);
-    this.bench.picture.element.append(this.second.element);
+    this.bench.picture.frame.append(this.second.element);
     fill(this.result, this.figures(other));
     const surface = await askArrays("scene", { name, scene: "surface" });
     this.second.setSurface(surface.arrays);

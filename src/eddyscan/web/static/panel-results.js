@@ -18,7 +18,8 @@ export class Results {
     this.about = h("div", {});
     this.channels = h("div", {});
     this.chosen = null;
-    const charts = h("div", { class: "card" }, h("h3", {}, "What the coil told there"), this.strip.canvas, this.plane.canvas, h("p", { class: "quiet" }, "Residual: reading minus sound metal at that lift-off and tilt."));
+    const charts = h("div", { class: "card" }, h("h3", {}, "Impedance plane of the residual"), this.plane.canvas, h("p", { class: "quiet" }, "Residual: reading minus sound metal at that lift-off and tilt."));
+    bench.picture.dock.replaceChildren(h("div", { class: "strip" }, this.strip.canvas));
     this.element = h("div", {}, h("h2", {}, "Results"), this.list, this.about, this.channels, charts);
     this.drawList();
   }
@@ -40,6 +41,7 @@ export class Results {
 
   leave() {
     this.viewer.onPick = () => {};
+    this.bench.picture.dock.replaceChildren();
   }
 
   drawChannels() {
@@ -109,7 +111,7 @@ export class Results {
     const n = results ? Math.min(readings.count, results.lift_off_mm.length) : 0;
     const marked = this.one ? readings.near(this.one.centre_mm, Math.max(4, this.one.extent_mm / 2 + 2)).filter((k) => k < n) : null;
     const size = results ? Float64Array.from(results.residual_re_ohm, (re, k) => Math.hypot(re, results.residual_im_ohm[k])) : new Float64Array(0);
-    this.strip.draw({ time: readings.column("time_s"), values: size, count: n, title: "Residual, amplitude", unit: "mΩ", scale: 1e3, marked });
+    this.strip.draw({ time: readings.column("shown_s"), values: size, count: n, title: "Residual, amplitude", unit: "mΩ", scale: 1e3, marked });
     this.plane.null = [0, 0];
     this.plane.draw({ re: results?.residual_re_ohm || [], im: results?.residual_im_ohm || [], count: n, marked });
   }

@@ -13,7 +13,8 @@ export class Scan {
     this.bar = new LiftBar(h("canvas", { class: "chart" }));
     this.state = h("div", { role: "status" });
     this.now = h("div", { class: "quiet" });
-    this.element = h("div", {}, h("h2", {}, "Scan"), this.state, h("div", { class: "card" }, this.bar.canvas, this.now), this.stripCard(), this.planeCard());
+    this.element = h("div", {}, h("h2", {}, "Scan"), this.state, h("div", { class: "card" }, this.bar.canvas, this.now), this.planeCard());
+    bench.picture.dock.replaceChildren(this.stripCard());
     this.seen = -1;
   }
 
@@ -27,7 +28,7 @@ export class Scan {
     };
     this.window = h("select", { "aria-label": "time shown" }, [["0", "all"], ["10", "last 10 s"], ["60", "last minute"]].map(([value, label]) => h("option", { value }, label)));
     this.window.onchange = () => this.draw();
-    return h("div", { class: "card" }, h("div", { class: "row" }, select, this.window), this.strip.canvas);
+    return h("div", { class: "strip" }, h("div", { class: "pick" }, select, this.window), this.strip.canvas);
   }
 
   planeCard() {
@@ -50,6 +51,10 @@ export class Scan {
       this.draw();
     }, { kind: "small" });
     return h("div", { class: "card" }, h("h3", {}, "Impedance plane"), this.plane.canvas, h("div", { class: "row" }, turn, gain), h("div", { class: "row" }, keep, h("span", { class: "tight" }, zero)));
+  }
+
+  leave() {
+    this.bench.picture.dock.replaceChildren();
   }
 
   loaded() {
@@ -80,10 +85,10 @@ export class Scan {
     const facts = LIVE_CHANNELS[channel];
     const lift = this.app.overview.lift_off_mm;
     const limits = channel === "lift_off_mm" ? [{ at: lift.limit, name: "limit", colour: "--bad" }, { at: lift.planned, name: "planned", colour: "--soft" }] : [];
-    this.strip.draw({ time: readings.column("time_s"), values: readings.column(channel), count: readings.count, title: facts.title, unit: facts.unit, limits, seconds: Number(this.window.value) });
+    this.strip.draw({ time: readings.column("shown_s"), values: readings.column(channel), count: readings.count, title: facts.title, unit: facts.unit, limits, seconds: Number(this.window.value) });
     this.plane.draw({ re: readings.column("resistance_ohm"), im: readings.column("reactance_ohm"), count: readings.count });
     const last = readings.last();
     this.bar.draw({ value: last ? last.lift_off_mm : null, planned: lift.planned, limit: lift.limit });
-    this.now.textContent = last ? `reading ${readings.count}, row ${last.row + 1}, point ${last.point + 1} at ${number(last.x_mm, 1)}, ${number(last.y_mm, 1)}, ${number(last.z_mm, 1)} mm; R ${ohms(last.resistance_ohm)}, X ${ohms(last.reactance_ohm)}; lift-off as the axes tell it` : "";
+    this.now.textContent = last ? `reading ${readings.count}, row ${last.row + 1}, point ${last.point + 1} at ${number(last.x_mm, 1)}, ${number(last.y_mm, 1)}, ${number(last.z_mm, 1)} mm; R ${ohms(last.resistance_ohm)}, X ${ohms(last.reactance_ohm)}; lift-off as the coil tells it` : "";
   }
 }

@@ -1,13 +1,13 @@
 // What the picture shows at each step, and how the live readings get into it.
 
-import { button, h, number } from "./dom.js";
+import { button, h, number, say } from "./dom.js";
 import { colours, spread } from "./colours.js";
 import { Viewer } from "./viewer.js";
 
 const LAYERS = {
   views: ["cloud", "eyes"],
   surface: ["surface", "eyes"],
-  plan: ["surface", "path", "uncovered"],
+  plan: ["surface", "path", "uncovered", "probe", "probe tip"],
   align: ["surface", "path", "probe", "probe tip"],
   record: ["surface", "route", "readings", "probe", "probe tip"],
   cscan: ["surface", "called", "here"],
@@ -27,7 +27,7 @@ const EMPTY = {
 export const LIVE_CHANNELS = {
   reactance_ohm: { title: "Reactance X", unit: "Ω", digits: 3 },
   resistance_ohm: { title: "Resistance R", unit: "Ω", digits: 3 },
-  lift_off_mm: { title: "Lift-off by the axes", unit: "mm", digits: 2 },
+  lift_off_mm: { title: "Lift-off by the coil", unit: "mm", digits: 2 },
 };
 
 export class Picture {
@@ -35,7 +35,9 @@ export class Picture {
     this.app = app;
     this.bench = bench;
     this.viewer = new Viewer();
-    this.element = h("section", { id: "picture", "aria-label": "picture of the part" }, this.viewer.element);
+    this.frame = h("div", { id: "picture" }, this.viewer.element);
+    this.dock = h("div", { id: "dock" });
+    this.element = h("section", { id: "centre", "aria-label": "picture of the part" }, this.frame, this.dock);
     this.data = {};
     this.stamps = {};
     this.channel = "reactance_ohm";
@@ -45,8 +47,8 @@ export class Picture {
 
   tools() {
     const look = (name, label) => button(label, () => { this.viewer.camera.look(name); this.viewer.fit(); }, { kind: "small" });
-    this.toggles = h("span", { class: "row" });
-    this.viewer.tools.append(this.toggles, look("corner", "3-D"), look("top", "Top"), look("front", "Side"), button("Fit", () => this.viewer.fit(), { kind: "small" }));
+    this.toggles = this.viewer.tools;
+    this.viewer.looks.append(look("corner", "3-D"), look("top", "Top"), look("front", "Side"), button("Fit", () => this.viewer.fit(), { kind: "small" }));
   }
 
   // Load what the folder has and what is not loaded yet.
@@ -69,7 +71,7 @@ export class Picture {
       this[`on_${scene}`]?.(this.data[scene]);
     } catch (fault) {
       this.forget(scene);
-      if (scene !== "record") throw fault;
+      say(fault.message, "error");
     }
   }
 
@@ -130,7 +132,7 @@ export class Picture {
 
   on_cscan({ arrays }) {
     this.cscanChannels = Object.keys(arrays).filter((name) => name.startsWith("channel ")).map((name) => name.slice(8));
-    const wanted = ["amplitude_ohm", "residual_ohm", "score", "lift_off_mm"].find((name) => this.cscanChannels.includes(name));
+    const wanted = ["score", "residual_ohm", "amplitude_ohm", "lift_off_mm"].find((name) => this.cscanChannels.includes(name));
     this.shownChannel = this.cscanChannels.includes(this.shownChannel) ? this.shownChannel : wanted;
   }
 
@@ -138,6 +140,7 @@ export class Picture {
 
   show(step) {
     const shown = LAYERS[step] || [];
+    if (step === "plan" || step === "align") this.viewer.setProbe(null);
     this.viewer.show(shown);
     this.paint(step);
     const missing = step === "views" ? !this.viewer.has("cloud") : !this.viewer.has("surface");
@@ -147,6 +150,7 @@ export class Picture {
   }
 
   toggle(shown) {
+    this.toggled = this.viewer.has("readings");
     const names = Object.keys(CHOICES).filter((name) => this.viewer.has(name));
     this.toggles.replaceChildren(
       ...names.map((name) => {
@@ -204,6 +208,7 @@ export class Picture {
     const size = this.app.overview.summaries.plan?.spacing_mm?.[1] || 4;
     this.viewer.setPoints("readings", readings.positions(), colours(values, ...this.range), { px: 4, mm: 0.95 * size, lift: 0.003 });
     const facts = LIVE_CHANNELS[this.channel];
+    if (this.bench.step === "record" && !this.toggled) this.toggle(LAYERS.record);
     if (this.bench.step === "record") this.viewer.legend({ title: `${facts.title} [${facts.unit}], raw`, low: number(this.range[0], facts.digits), high: number(this.range[1], facts.digits), map: "viridis" });
     this.probeAtLast();
   }

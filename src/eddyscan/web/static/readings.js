@@ -2,12 +2,15 @@
 
 export const COLUMNS = ["row", "point", "time_s", "x_mm", "y_mm", "z_mm", "resistance_ohm", "reactance_ohm", "flag", "lift_off_mm"];
 
+const KEPT = [...COLUMNS, "shown_s"];
+
 export class Readings {
   constructor() {
     this.count = 0;
     this.room = 0;
     this.seen = new Map();
-    this.columns = Object.fromEntries(COLUMNS.map((name) => [name, new Float64Array(0)]));
+    this.offset = 0;
+    this.columns = Object.fromEntries(KEPT.map((name) => [name, new Float64Array(0)]));
   }
 
   add(rows) {
@@ -20,10 +23,18 @@ export class Readings {
         this.columns[name][this.count] = row[k] === null ? NaN : row[k];
       });
       this.seen.set(key, this.count);
+      this.clock(this.count);
       this.count++;
       news++;
     }
     return news;
+  }
+
+  // A resumed scan's clock begins again: the chart's time goes on where it stopped.
+  clock(k) {
+    const { time_s: time, shown_s: shown } = this.columns;
+    if (k && time[k] < time[k - 1]) this.offset = shown[k - 1] - time[k] + 1;
+    shown[k] = time[k] + this.offset;
   }
 
   addTable(table, width = COLUMNS.length) {
@@ -35,7 +46,7 @@ export class Readings {
   reserve(count) {
     if (count <= this.room) return;
     this.room = Math.max(1024, 2 * count);
-    for (const name of COLUMNS) {
+    for (const name of KEPT) {
       const wider = new Float64Array(this.room);
       wider.set(this.columns[name]);
       this.columns[name] = wider;

@@ -17,10 +17,11 @@ export class Viewer {
     this.onTurn = () => {};
     this.canvas = h("canvas", { tabindex: "0", role: "img", "aria-label": "3-D picture of the part; arrow keys turn it" });
     this.tools = h("div", { class: "tools" });
+    this.looks = h("div", { class: "looks" });
     this.hint = h("div", { class: "hint" }, "drag: turn · right button or two fingers: shift · wheel: nearer");
     this.legendPlace = h("div", { class: "legend", hidden: true });
     this.nothing = h("div", { class: "nothing" });
-    this.element = h("div", { class: "viewer" }, this.canvas, h("div", { class: "caption" }, caption), this.tools, this.hint, this.legendPlace, this.nothing);
+    this.element = h("div", { class: "viewer" }, this.canvas, h("div", { class: "caption" }, caption), this.tools, this.looks, this.hint, this.legendPlace, this.nothing);
     try {
       this.painter = new Painter(this.canvas);
     } catch (fault) {
@@ -94,11 +95,14 @@ export class Viewer {
 
   // The probe as a pencil: its coil face at `at`, its body along -axis.
   setProbe(at, axis, rgb = [209, 0, 108]) {
-    if (!this.painter || !at) return this.set("probe", null);
+    if (!this.painter || !at) {
+      this.set("probe", null);
+      this.set("probe tip", null);
+      return;
+    }
     const end = at.map((value, k) => value - 32 * axis[k]);
-    this.setSegments("probe", new Float32Array([...at, ...end]), rgb, { px: 5, lift: 0.004, always: true });
-    this.setPoints("probe tip", new Float32Array(at), rgb, { px: 15, lift: 0.006, always: true });
-    return undefined;
+    this.setSegments("probe", new Float32Array([...at, ...end]), rgb, { px: 5, lift: 0.004 });
+    this.setPoints("probe tip", new Float32Array(at), rgb, { px: 15, lift: 0.006 });
   }
 
   legend(facts) {
@@ -149,7 +153,7 @@ export class Viewer {
     const light = back.map((value, k) => 0.82 * value + 0.57 * up[k]);
     for (const order of ["mesh", "lines", "points"]) {
       for (const [name, layer] of Object.entries(this.layers)) {
-        if (layer.kind !== order || (this.hidden.has(name) && !layer.always)) continue;
+        if (layer.kind !== order || this.hidden.has(name)) continue;
         if (order === "mesh") this.painter.drawMesh(layer.thing, mvp, light);
         else if (order === "lines") this.painter.drawLines(layer.thing, mvp, layer);
         else this.painter.drawPoints(layer.thing, mvp, { ...layer, mmScale: this.camera.focal / 2 });
