@@ -45,15 +45,13 @@ class KeysightE4980A:
     def __init__(self, settings: KeysightE4980ASettings, clock: Clock) -> None:
         self.settings, self._clock = settings, clock
         self._link = open_visa_session(settings.address, settings.timeout_s)
-        with self._link.guarded("connect"):
-            self._meter = _pymeasure_meter(self._link.adapter)
-            self._link.set_timeout(settings.timeout_s)
-            self._identity = self._read_identity()
-            self._meter.write("*CLS")
-            self._meter.mode = "RX"
-            self._meter.aperture(settings.aperture, settings.averages)
-            self._meter.trigger_source = "BUS"
-            self._meter.write("INIT:CONT ON")
+        try:
+            with self._link.guarded("connect"):
+                self._meter = _pymeasure_meter(self._link.adapter)
+                self._prepare()
+        except BaseException:
+            self._link.close()
+            raise
 
     def identity(self) -> Identity:
         """Return what the meter said it is."""
@@ -105,6 +103,15 @@ class KeysightE4980A:
     def close(self) -> None:
         """Close the link; again: nothing."""
         self._link.close()
+
+    def _prepare(self) -> None:
+        self._link.set_timeout(self.settings.timeout_s)
+        self._identity = self._read_identity()
+        self._meter.write("*CLS")
+        self._meter.mode = "RX"
+        self._meter.aperture(self.settings.aperture, self.settings.averages)
+        self._meter.trigger_source = "BUS"
+        self._meter.write("INIT:CONT ON")
 
     def _read_identity(self) -> Identity:
         said = [word.strip() for word in self._link.ask("*IDN?").split(",")]

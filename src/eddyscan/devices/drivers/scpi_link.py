@@ -43,7 +43,7 @@ class VisaLink:
         except Exception as fault:
             raise LinkError(
                 f"the instrument at {self.address} failed to {doing}: {_in_words(fault)}. "
-                "Check cable, address and power, then run again; what was recorded is kept."
+                "Check the cable, the power and the address in rig.toml, then run again; what was recorded is kept."
             ) from fault
 
 
