@@ -16,6 +16,7 @@ from eddyscan.pipeline.states import inputs_of
 from eddyscan.pipeline.truth import keep_truth_log
 
 if TYPE_CHECKING:
+    from eddyscan.core.mesh import SurfaceMesh
     from eddyscan.devices.rig import Rig
 
 
@@ -23,6 +24,7 @@ def scan_plan(
     inspection: Inspection, rig: Rig, *, dry_run: bool, progress: Progress, control: ScanControl | None = None
 ) -> None:
     """Follow 3-plan/plan.json into 4-record/record.sqlite; goes on where an earlier run stopped."""
+    from eddyscan.formats.meshes import read_mesh
     from eddyscan.formats.plans import read_plan
     from eddyscan.formats.records import SqliteRecord
     from eddyscan.scanning import check, run
@@ -34,8 +36,9 @@ def scan_plan(
     folder = inspection.step_folder("record")
     if not dry_run:
         folder.mkdir(exist_ok=True)
-    T_stage_part = _alignment(inspection, rig, keep=not dry_run)
-    check(plan, rig.stage.axes(), T_stage_part, technique)
+    mesh = read_mesh(inspection.file("surface", "surface.ply"))
+    T_stage_part = _alignment(inspection, rig, mesh, keep=not dry_run)
+    check(plan, rig.stage.axes(), T_stage_part, technique, mesh=mesh)
     if dry_run:
         return
     write_json(folder / "inputs.json", inputs)
@@ -55,6 +58,7 @@ def scan_plan(
             sink=sink,
             technique=technique,
             T_stage_part=T_stage_part,
+            mesh=mesh,
             progress=progress,
         )
     finally:
@@ -70,14 +74,12 @@ def _set_stale_record_aside(inspection: Inspection, inputs: dict[str, str]) -> N
         inspection.set_aside("record")
 
 
-def _alignment(inspection: Inspection, rig: Rig, *, keep: bool) -> Array:
+def _alignment(inspection: Inspection, rig: Rig, mesh: SurfaceMesh, *, keep: bool) -> Array:
     """Return T_stage_part: from an earlier start of this scan, rig.toml, or the operator's jog."""
-    from eddyscan.formats.meshes import read_mesh
-
     path = inspection.file("record", "alignment.json")
     if path.is_file():
         return checked_transform(read_json(path)["T_stage_part"], str(path))
-    T_stage_part, how = rig.alignment(read_mesh(inspection.file("surface", "surface.ply")))
+    T_stage_part, how = rig.alignment(mesh)
     if keep:
         write_json(path, {"T_stage_part": np.asarray(T_stage_part).tolist(), "how": how})
     return T_stage_part

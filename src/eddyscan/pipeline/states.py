@@ -61,7 +61,7 @@ def _state_of(inspection: Inspection, step: str) -> StepState:
     note = inspection.note(step)
     if step == "views":
         files = inspection.view_files()
-        return StepState(step, "done" if files else "missing", f"{len(files)} views")
+        return StepState(step, "done" if files else "missing", f"{len(files)} views", (note or {}).get("seconds"))
     if not inspection.file(step, OUTPUTS[step]).is_file():
         return StepState(step, "missing")
     if note is None:
