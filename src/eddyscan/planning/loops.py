@@ -9,7 +9,7 @@ import numpy as np
 from eddyscan.core.frames import Array
 from eddyscan.planning.levels import Line
 
-GOOD_OF_STEP = 0.008
+GOOD_OF_STEP = 0.02
 MOVE_OF_PITCH = 0.045
 # Round a pole the smallest row is a square: three points would leave its sides uncovered.
 FEWEST, POLE_STEPS, POLE_MOVE_OF_PITCH = 4, 5, 0.25
@@ -74,7 +74,11 @@ def _move(line: Line, beside: list[Line], delta: float, step_mm: float, pitch_mm
     if abs(slope) < 0.5:
         return None
     limit = (POLE_MOVE_OF_PITCH if length < POLE_STEPS * step_mm else MOVE_OF_PITCH) * pitch_mm
-    return float(np.clip((_wanted(length, step_mm) - length) / slope, -limit, limit))
+    # Only as far as it takes: rows that move open a gap on their other side.
+    spare = 0.9 * GOOD_OF_STEP * step_mm * steps_in_loop(length, step_mm)
+    change = _wanted(length, step_mm) - length
+    change -= float(np.clip(change, -spare, spare))
+    return float(np.clip(change / slope, -limit, limit))
 
 
 def _partner(line: Line, others: list[Line], level: float) -> Line | None:
