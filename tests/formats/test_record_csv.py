@@ -7,33 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from record_examples import a_record, assert_same_readings
 
 from eddyscan.core.errors import FileError, GeometryError, InputError
-from eddyscan.core.frames import apply, rotation_about_z, transform
-from eddyscan.core.record import ScanRecord
-from eddyscan.formats.records import export_record
-
-
-def record_of(readings: int = 12, seed: int = 7) -> ScanRecord:
-    rng = np.random.default_rng(seed)
-    T_stage_part = transform(rotation_about_z(12.5), (11.0, -3.0, 7.0))
-    part = rng.uniform(0, 100, (readings, 3))
-    stage = apply(T_stage_part, part)
-    return ScanRecord(
-        row=np.arange(readings) // 4,
-        point=np.arange(readings) % 4,
-        time_s=np.sort(rng.uniform(0, 60, readings)),
-        stage_mm=stage,
-        target_mm=stage + rng.normal(0, 0.002, stage.shape),
-        frequency_hz=np.full(readings, 5e5),
-        impedance_ohm=rng.normal(2, 0.1, readings) + 1j * rng.normal(40, 0.1, readings),
-        flag=rng.integers(0, 3, readings),
-        meta={"T_stage_part": T_stage_part.tolist()},
-    )
+from eddyscan.formats.records import export_record, read_record_csv
 
 
 def test_the_header_is_the_published_one(tmp_path: Path) -> None:
-    file = export_record(record_of(), "csv", tmp_path / "r.csv")
+    file = export_record(a_record(), "csv", tmp_path / "r.csv")
     assert file.read_text().splitlines()[0] == (
         "reading,row,point,time_s,x_mm,y_mm,z_mm,x_stage_mm,y_stage_mm,z_stage_mm,"
         "frequency_hz,resistance_ohm,reactance_ohm,lift_off_mm,flag"
@@ -41,7 +22,7 @@ def test_the_header_is_the_published_one(tmp_path: Path) -> None:
 
 
 def test_every_number_stands_in_its_column(tmp_path: Path) -> None:
-    record = record_of()
+    record = a_record()
     lift = np.linspace(0.4, 0.6, len(record))
     lift[3] = np.nan
     export_record(record, "csv", tmp_path / "r.csv", lift_off_mm=lift)
@@ -67,12 +48,45 @@ def test_every_number_stands_in_its_column(tmp_path: Path) -> None:
 
 def test_lift_off_of_another_record_is_refused(tmp_path: Path) -> None:
     with pytest.raises(GeometryError, match="5 lift-off values for 12 readings"):
-        export_record(record_of(), "csv", tmp_path / "r.csv", lift_off_mm=np.zeros(5))
+        export_record(a_record(), "csv", tmp_path / "r.csv", lift_off_mm=np.zeros(5))
     assert not list(tmp_path.iterdir())
 
 
 def test_unknown_format_and_missing_folder(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written as 'xls'; known are csv"):
-        export_record(record_of(), "xls", tmp_path / "r.xls")
+    with pytest.raises(InputError, match="cannot be written as 'xls'; known are csv, nde, hdf5, ply"):
+        export_record(a_record(), "xls", tmp_path / "r.xls")
     with pytest.raises(FileError, match=r"does not exist\. Make it first"):
-        export_record(record_of(), "csv", tmp_path / "no" / "r.csv")
+        export_record(a_record(), "csv", tmp_path / "no" / "r.csv")
+
+
+def test_reads_back_bit_for_bit_with_pose_and_lift_off(tmp_path: Path) -> None:
+    given = a_record()
+    lift = np.linspace(0.4, 0.6, len(given))
+    back = read_record_csv(export_record(given, "csv", tmp_path / "r.csv", lift_off_mm=lift))
+    assert_same_readings(given, back)
+    np.testing.assert_allclose(back.T_stage_part, given.T_stage_part, atol=1e-10)
+    np.testing.assert_allclose(back.part_mm, given.part_mm, atol=1e-9)
+    assert back.meta["lift_off_mm"] == lift.tolist()
+
+
+def test_a_reading_without_value_stays_without(tmp_path: Path) -> None:
+    given = a_record()
+    given.impedance_ohm[3] = np.nan
+    back = read_record_csv(export_record(given, "csv", tmp_path / "r.csv"))
+    assert np.flatnonzero(np.isnan(back.impedance_ohm)).tolist() == [3]
+
+
+def test_a_cut_line_is_named(tmp_path: Path) -> None:
+    path = export_record(a_record(), "csv", tmp_path / "r.csv")
+    path.write_text(path.read_text()[:-40])
+    with pytest.raises(FileError, match=r"line 13 has \d+ cells, the first line has 15.*truncated or damaged there"):
+        read_record_csv(path)
+
+
+def test_a_word_among_the_numbers_is_named(tmp_path: Path) -> None:
+    path = export_record(a_record(), "csv", tmp_path / "r.csv")
+    lines = path.read_text().splitlines()
+    lines[5] = lines[5].replace("500000.0", "fast")
+    path.write_text("\n".join(lines))
+    with pytest.raises(FileError, match="line 6: 'fast' is not a number"):
+        read_record_csv(path)

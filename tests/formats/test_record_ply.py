@@ -6,22 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from record_examples import a_cscan, a_record
 
 from eddyscan.core.cscan import CScan
 from eddyscan.core.errors import FileError, GeometryError
-from eddyscan.core.mesh import SurfaceMesh
-from eddyscan.core.parts import named_part
 from eddyscan.formats.record_ply import read_cscan_ply, write_cscan_ply
-
-
-def a_cscan(*, uncertain: bool = True) -> CScan:
-    top = named_part("block-a").top_mesh(10.0)
-    rng = np.random.default_rng(4)
-    n = len(top.vertices)
-    mesh = SurfaceMesh(top.vertices, top.faces, top.normals, rng.uniform(0, 0.1, n) if uncertain else None)
-    covered = rng.uniform(size=n) > 0.2
-    lift = np.where(covered, rng.normal(0.5, 0.01, n), np.nan)
-    return CScan(mesh, covered, {"lift_off_mm": lift, "residual_ohm": rng.normal(size=n)})
+from eddyscan.formats.records import export_record
 
 
 @pytest.mark.parametrize("uncertain", [True, False])
@@ -84,3 +74,16 @@ def test_a_channel_that_no_ply_can_name_is_refused(tmp_path: Path) -> None:
     odd = CScan(given.mesh, given.covered, {"lift off [mm]": np.zeros(len(given.covered))})
     with pytest.raises(GeometryError, match=r"'lift off \[mm\]' cannot be a PLY property"):
         write_cscan_ply(odd, tmp_path / "c.ply")
+
+
+def test_a_record_without_cscan_becomes_points_another_reader_sees(tmp_path: Path) -> None:
+    import trimesh
+
+    record = a_record()
+    lift = np.linspace(0.4, 0.6, len(record))
+    export_record(record, "ply", tmp_path / "r.ply", lift_off_mm=lift)
+    other = trimesh.load(tmp_path / "r.ply", process=False)
+    np.testing.assert_allclose(other.vertices, record.part_mm)
+    data = other.metadata["_ply_raw"]["vertex"]["data"]
+    np.testing.assert_array_equal(data["reactance_ohm"].ravel(), record.impedance_ohm.imag)
+    np.testing.assert_array_equal(data["lift_off_mm"].ravel(), lift)

@@ -11,6 +11,7 @@ from eddyscan.core.cscan import CScan
 from eddyscan.core.errors import FileError, GeometryError
 from eddyscan.core.frames import Array, BoolArray, IntArray
 from eddyscan.core.mesh import SurfaceMesh
+from eddyscan.core.record import ScanRecord
 from eddyscan.formats.record_atomic import replacing
 
 TYPES = {
@@ -69,6 +70,20 @@ def _header(columns: list[str], vertices: int, faces: int, frame: str) -> bytes:
     lines += [f"element vertex {vertices}", *(f"property double {name}" for name in columns)]
     lines += [f"property uchar {COVERED}", f"element face {faces}", "property list uchar int vertex_indices"]
     return ("\n".join(lines) + "\n").encode("ascii") + END
+
+
+def write_record_ply(record: ScanRecord, path: Path | str, *, lift_off_mm: Array | None = None) -> None:
+    """Write the coil positions [mm, part] as points with the readings as properties."""
+    columns: dict[str, Array] = dict(zip("xyz", record.part_mm.T, strict=True))
+    columns |= {"resistance_ohm": record.impedance_ohm.real, "reactance_ohm": record.impedance_ohm.imag}
+    if lift_off_mm is not None:
+        columns["lift_off_mm"] = lift_off_mm
+    columns |= {name: getattr(record, name).astype(np.float64) for name in ("time_s", "row", "point", "flag")}
+    table = np.stack(list(columns.values()), axis=1)
+    lines = ["ply", "format binary_little_endian 1.0", "comment eddyscan readings", "comment frame part"]
+    lines += [f"element vertex {len(record)}", *(f"property double {name}" for name in columns)]
+    with replacing(Path(path)) as draft:
+        draft.write_bytes(("\n".join(lines) + "\n").encode("ascii") + END + table.astype("<f8").tobytes())
 
 
 def read_cscan_ply(path: Path | str) -> CScan:

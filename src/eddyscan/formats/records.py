@@ -12,15 +12,20 @@ from pathlib import Path
 
 import numpy as np
 
-from eddyscan.core.errors import FileError, InputError
+from eddyscan.core.cscan import CScan
+from eddyscan.core.errors import FileError, GeometryError, InputError
 from eddyscan.core.frames import Array
 from eddyscan.core.record import ScanRecord
-from eddyscan.formats.record_csv import read_record_csv, write_record_csv
+from eddyscan.formats.record_csv import write_record_csv
+from eddyscan.formats.record_csv_import import read_record_csv
+from eddyscan.formats.record_hdf5 import write_hdf5
+from eddyscan.formats.record_nde import write_nde
+from eddyscan.formats.record_ply import write_cscan_ply, write_record_ply
 from eddyscan.formats.record_sqlite import COLUMNS, SqliteRecord, check_kind, explained, is_blank, read_notes
 
 __all__ = ["RECORD_FORMATS", "SqliteRecord", "export_record", "read_record", "read_record_csv", "record_passes"]
 
-RECORD_FORMATS = ("csv",)
+RECORD_FORMATS = ("csv", "nde", "hdf5", "ply")
 
 
 def _open(path: Path) -> sqlite3.Connection:
@@ -93,16 +98,38 @@ def read_record(path: Path | str, *, scan_pass: int | None = None) -> ScanRecord
     )
 
 
-def export_record(record: ScanRecord, format_name: str, path: Path | str, *, lift_off_mm: Array | None = None) -> Path:
+def export_record(
+    record: ScanRecord,
+    format_name: str,
+    path: Path | str,
+    *,
+    lift_off_mm: Array | None = None,
+    cscan: CScan | None = None,
+) -> Path:
     """Write a record for other systems and return the file's path.
 
     Parameters
     ----------
     format_name : one of `RECORD_FORMATS`
-    lift_off_mm : (N,) [mm] lift-off of each reading as analysed; None leaves the column empty
+        csv: one line per reading; nde: Evident .nde 4.3; hdf5: the archive with
+        units and frames; ply: the C-scan on the surface, or without one the coil
+        positions as points.
+    lift_off_mm : (N,) [mm] lift-off of each reading as analysed; None leaves it out
+    cscan : goes into hdf5 and ply
     """
     path = Path(path)
+    if lift_off_mm is not None and len(lift_off_mm) != len(record):
+        raise GeometryError(f"{len(lift_off_mm)} lift-off values for {len(record)} readings. Analyse this very record.")
     if format_name == "csv":
         write_record_csv(record, path, lift_off_mm=lift_off_mm)
-        return path
-    raise InputError(f"a record cannot be written as {format_name!r}; known are {', '.join(RECORD_FORMATS)}.")
+    elif format_name == "nde":
+        write_nde(record, path, lift_off_mm=lift_off_mm)
+    elif format_name == "hdf5":
+        write_hdf5(record, path, lift_off_mm=lift_off_mm, cscan=cscan)
+    elif format_name == "ply" and cscan is not None:
+        write_cscan_ply(cscan, path)
+    elif format_name == "ply":
+        write_record_ply(record, path, lift_off_mm=lift_off_mm)
+    else:
+        raise InputError(f"a record cannot be written as {format_name!r}; known are {', '.join(RECORD_FORMATS)}.")
+    return path

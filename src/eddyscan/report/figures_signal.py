@@ -43,7 +43,7 @@ def reading_maps(record: ScanRecord, residual_ohm: ComplexArray | None, lift_off
 def readings_figure(record: ScanRecord, maps: dict[str, Array], theme: Theme) -> Figure:
     """Draw every reading where it was taken, one map per channel, raw."""
     part, rows = record.part_mm, (len(maps) + 1) // 2
-    figure, panels = canvas(height_in=map_height_in(part, 4.5) * rows, rows=rows, columns=2, squeeze=False)
+    figure, panels = canvas(height_in=map_height_in(part, 4.5, extra_in=0.95) * rows, rows=rows, columns=2, squeeze=False)
     for panel, (title, values) in zip(panels.flat, maps.items(), strict=False):
         known = np.isfinite(values)
         drawn = panel.scatter(
@@ -85,7 +85,7 @@ def cscan_figure(cscan: CScan, names: list[str], theme: Theme) -> Figure:
     """Draw C-scan channels on the surface, seen from above; nothing where no reading speaks for the spot."""
     rows = (len(names) + 1) // 2
     figure, panels = canvas(
-        height_in=map_height_in(cscan.mesh.vertices, 4.5) * rows, rows=rows, columns=2, squeeze=False
+        height_in=map_height_in(cscan.mesh.vertices, 4.5, extra_in=0.95) * rows, rows=rows, columns=2, squeeze=False
     )
     mesh = cscan.mesh
     for panel, name in zip(panels.flat, names, strict=False):

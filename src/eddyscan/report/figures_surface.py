@@ -126,7 +126,7 @@ def deviation_figure(mesh: SurfaceMesh, signed_mm: Array, theme: Theme) -> Figur
 def uncertainty_figure(mesh: SurfaceMesh, theme: Theme) -> Figure:
     """Draw the stated standard uncertainty of the surface over the part."""
     assert mesh.uncertainty_mm is not None
-    figure, plan = canvas(height_in=map_height_in(mesh.vertices, 4.4), width_in=4.4)
+    figure, plan = canvas(height_in=map_height_in(mesh.vertices, 4.4, extra_in=0.95), width_in=4.4)
     drawn = plan.tripcolor(
         mesh.vertices[:, 0],
         mesh.vertices[:, 1],

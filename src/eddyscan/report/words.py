@@ -97,9 +97,9 @@ def flattened(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str
     """Give (label, text) for every entry, nested tables with their parents' names in front."""
     for key, value in values.items():
         if isinstance(value, Mapping):
-            yield from flattened(value, f"{prefix}{spelled(str(key))} · ")
+            yield from flattened(value, f"{prefix}{label(str(key))} · ")
         elif isinstance(value, (list, tuple)) and value and all(isinstance(entry, Mapping) for entry in value):
             for index, entry in enumerate(value, start=1):
-                yield from flattened(entry, f"{prefix}{spelled(str(key))} {index} · ")
+                yield from flattened(entry, f"{prefix}{label(str(key))} {index} · ")
         else:
             yield prefix + label(str(key)), value_text(value)
