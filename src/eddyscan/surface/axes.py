@@ -18,6 +18,7 @@ from eddyscan.surface.outline import Outline
 
 LEVEL_MM = 0.15
 FLUSH_DEG = 2.0
+FLUSH_SHARE = 0.6  # a side shorter than this share of the box may be a chord of a curved border
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,10 @@ def _box_angle_deg(outline: Outline) -> float:
     """Return the direction of the min-area box, turned onto the straight sides that are flush with it."""
     import cv2
 
-    _, _, angle = cv2.minAreaRect(outline.polygon.astype(np.float32))
+    _, size, angle = cv2.minAreaRect(outline.polygon.astype(np.float32))
     off = (outline.straight_deg - angle + 45.0) % 90.0 - 45.0
-    flush = np.abs(off) < FLUSH_DEG
+    along = np.abs((outline.straight_deg - angle + 90.0) % 180.0 - 90.0) < 45.0
+    flush = (np.abs(off) < FLUSH_DEG) & (outline.straight_mm > FLUSH_SHARE * np.where(along, size[0], size[1]))
     if flush.any():
         angle += float(np.average(off[flush], weights=outline.straight_mm[flush] ** 3))
     return float(angle)

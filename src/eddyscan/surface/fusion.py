@@ -24,6 +24,7 @@ from eddyscan.surface.view import View
 CELL_MM = 1.0
 MAX_CELLS = 400_000
 HOLE_REACH_MM = 3.0  # farther than this from any measured cell the surface is not delivered
+HOLE_WORTH_MM2 = 20.0
 STEEP_COSINES = (np.cos(np.radians(82.0)), np.cos(np.radians(60.0)))
 STEEP_SHARE = 0.08
 
@@ -44,15 +45,20 @@ def fuse(views: Sequence[View], part: PartFrame, settings: Surface, *, progress:
     being a wall; then a robust spline, else 3-D moving least squares and Poisson.
     """
     progress("fusing the surface", 0, 1)
-    low, high = part.box(1.0)
-    normals = np.concatenate([v.surfels_in(part.T_part_world, low + np.array([0, 0, 1.0]), high)[1] for v in views])
-    if _steep_share(normals) > STEEP_SHARE:
+    if not is_height_field(views, part):
         mesh, warnings = fuse_free_form(views, part, settings)
         fused = Fused(mesh, warnings, "free form")
     else:
         fused = _fuse_height_field(views, part, settings)
     progress("fusing the surface", 1, 1)
     return fused
+
+
+def is_height_field(views: Sequence[View], part: PartFrame) -> bool:
+    """Say whether hardly any of the part's surface is steep without being a wall."""
+    low, high = part.box(1.0)
+    found = [v.surfels_in(part.T_part_world, low + np.array([0, 0, 1.0]), high)[1] for v in views]
+    return _steep_share(np.concatenate(found)) <= STEEP_SHARE
 
 
 def _steep_share(normals: Array) -> float:
@@ -64,28 +70,33 @@ def _steep_share(normals: Array) -> float:
     return float(steep.sum() / max(int(steep.sum() + top.sum()), 1))
 
 
-def collect_cells(views: Sequence[View], part: PartFrame) -> HeightCells:
+def collect_cells(views: Sequence[View], part: PartFrame, *, cell_mm: float = CELL_MM) -> HeightCells:
     """Bin every view's points over the part, one view at a time: memory follows one view, not all."""
     size = part.size_mm[:2]
-    cell = max(CELL_MM, float(np.sqrt(size.prod() / MAX_CELLS)))
+    cell = max(cell_mm, float(np.sqrt(size.prod() / MAX_CELLS)))
     n = np.maximum(np.round(size / cell).astype(int), 2)
-    cell_mm = size / n
+    exact = size / n
     low, high = part.box(0.0)
     layers = [
         cells_of_view(
-            *v.points_in(part.T_part_world, low, high + np.array([0, 0, 5.0])), np.zeros(2), cell_mm, (n[0], n[1])
+            *v.points_in(part.T_part_world, low, high + np.array([0, 0, 5.0])), np.zeros(2), exact, (n[0], n[1])
         )
         for v in views
     ]
     height, offset, weight = (np.stack([layer[k] for layer in layers]) for k in range(3))
-    return HeightCells(height, offset, weight, cell_mm, np.zeros(2))
+    return HeightCells(height, offset, weight, exact, np.zeros(2))
+
+
+def cells_inside(cells: HeightCells, part: PartFrame) -> NDArray[np.bool_]:
+    """Return which cells (nx, ny) have their centre inside the outline."""
+    x, y = cells.centres()
+    centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return inside_polygon(centres, part.outline.polygon).reshape(cells.shape)
 
 
 def _fuse_height_field(views: Sequence[View], part: PartFrame, settings: Surface) -> Fused:
     cells = collect_cells(views, part)
-    x, y = cells.centres()
-    centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    inside = inside_polygon(centres, part.outline.polygon).reshape(cells.shape)
+    inside = cells_inside(cells, part)
     if not (cells.weight.sum(axis=0)[inside] > 0).any():
         raise GeometryError("no view saw the top of the part: all cells inside its outline are empty. Take more views.")
     field = fit_height_field(cells, inside)
@@ -112,6 +123,8 @@ def _gaps(cells: HeightCells, field: HeightField, inside: NDArray[np.bool_]) -> 
     if not hidden.any():
         return gap, ()
     area = float(hidden.sum() * cells.cell_mm.prod())
+    if area < HOLE_WORTH_MM2:
+        return gap, ()
     where = np.argwhere(hidden).mean(axis=0) * cells.cell_mm
     return gap, (
         f"{area:.0f} mm2 of the part were seen by no view (round x = {where[0]:.0f}, y = {where[1]:.0f} mm); "

@@ -12,6 +12,7 @@ from eddyscan.surface.cells import HeightCells
 from eddyscan.surface.spline import GridFit, HeightSpline, SplineBasis
 
 KNOT_MM = 4.0
+ROUGH_KNOT_MM = 6.0
 MAX_COEFFICIENTS = 9000
 SCALE_FLOOR_MM = 0.05
 TUKEY = 4.685
@@ -43,6 +44,16 @@ class HeightField:
     fit: GridFit
 
 
+def rough_height(cells: HeightCells, inside: NDArray[np.bool_], *, margin_mm: float) -> HeightSpline:
+    """Fit a quick spline that reaches `margin_mm` beyond the cells, straight on."""
+    fit = _grid_fit(cells, knot_mm=ROUGH_KNOT_MM, margin_mm=margin_mm)
+    base = cells.weight * inside
+    state = _State(cells, fit, base, _start(cells, base))
+    for _ in range(5):
+        state.step(1.0)
+    return HeightSpline(state.coefficients, fit.basis_x, fit.basis_y)
+
+
 def fit_height_field(cells: HeightCells, inside: NDArray[np.bool_]) -> HeightField:
     """Fit the cells inside the outline.
 
@@ -51,8 +62,7 @@ def fit_height_field(cells: HeightCells, inside: NDArray[np.bool_]) -> HeightFie
     cells : HeightCells
     inside : (nx, ny) cells whose centre lies inside the outline
     """
-    x, y = cells.centres()
-    fit = _grid_fit(cells, x, y)
+    fit = _grid_fit(cells, knot_mm=KNOT_MM, margin_mm=0.0)
     base = cells.weight * inside
     start = _start(cells, base)
     state = _State(cells, fit, base, start)
@@ -66,10 +76,11 @@ def fit_height_field(cells: HeightCells, inside: NDArray[np.bool_]) -> HeightFie
     return HeightField(spline, smoothing, state.scale, state.robust, state.residual, factor, fit)
 
 
-def _grid_fit(cells: HeightCells, x: Array, y: Array) -> GridFit:
-    span_x = (cells.low_mm[0], cells.low_mm[0] + cells.shape[0] * cells.cell_mm[0])
-    span_y = (cells.low_mm[1], cells.low_mm[1] + cells.shape[1] * cells.cell_mm[1])
-    knot = max(KNOT_MM, np.sqrt((span_x[1] - span_x[0]) * (span_y[1] - span_y[0]) / MAX_COEFFICIENTS))
+def _grid_fit(cells: HeightCells, *, knot_mm: float, margin_mm: float) -> GridFit:
+    x, y = cells.centres()
+    low, high = cells.low_mm - margin_mm, cells.low_mm + np.array(cells.shape) * cells.cell_mm + margin_mm
+    span_x, span_y = (low[0], high[0]), (low[1], high[1])
+    knot = max(knot_mm, np.sqrt((span_x[1] - span_x[0]) * (span_y[1] - span_y[0]) / MAX_COEFFICIENTS))
     return GridFit(
         x,
         y,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,10 +56,13 @@ class HeightMap:
     def look_up(self, xy: Array) -> Array:
         """Return the height at (..., 2) table positions [mm], NaN where unseen."""
         n = self.height.shape[0]
-        cell = np.floor((xy - self.centre_mm) / CELL_MM + n / 2).astype(np.int64)
-        inside = ((cell >= 0) & (cell < n)).all(axis=-1)
-        i, j = np.where(inside, cell[..., 0], 0), np.where(inside, cell[..., 1], 0)
-        return np.where(inside & self.seen[i, j], self.height[i, j], np.nan)
+        cell = ((xy - self.centre_mm) / CELL_MM + (n / 2 + 1)).astype(np.int64)  # one cell of NaN all round
+        np.clip(cell, 0, n + 1, out=cell)
+        return np.asarray(self._bordered.ravel()[cell[..., 0] * (n + 2) + cell[..., 1]])
+
+    @cached_property
+    def _bordered(self) -> Array:
+        return np.pad(np.where(self.seen, self.height, np.nan).astype(np.float64), 1, constant_values=np.nan)
 
 
 def _grown(mask: NDArray[np.bool_], cells: int) -> NDArray[np.bool_]:

@@ -1,33 +1,13 @@
-"""The one place that talks to Open3D."""
+"""The one place of this room that talks to Open3D."""
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import glob
-import os
 from typing import Any
 
 import numpy as np
 
 from eddyscan.core.frames import Array, IntArray
-
-
-def open3d() -> Any:
-    """Import Open3D with libusb preloaded: its wheel links to a library that slim systems lack."""
-    try:
-        ctypes.CDLL("libusb-1.0.so.0", mode=ctypes.RTLD_GLOBAL)
-    except OSError:
-        import libusb_package
-
-        folder = os.path.dirname(libusb_package.__file__)
-        for path in glob.glob(os.path.join(folder, "libusb-1.0*")):
-            with contextlib.suppress(OSError):
-                ctypes.CDLL(path, mode=ctypes.RTLD_GLOBAL)
-    import open3d as library
-
-    library.utility.set_verbosity_level(library.utility.VerbosityLevel.Error)
-    return library
+from eddyscan.core.open3d_loader import load_open3d as open3d
 
 
 def cloud(points: Array, normals: Array | None = None) -> Any:

@@ -64,11 +64,10 @@ def trace_outline(points: Array, walls: Array, wall_normals: Array) -> Outline:
     wall_normals : (M, 3) unit outward
     """
     contour = _resampled(_footprint_contour(points))
-    normal = _outward(contour)
-    steep = np.abs(wall_normals[:, 2]) < WALL_SLOPE
-    offset, known = _wall_offsets(contour, normal, walls[steep, :2], wall_normals[steep, :2])
+    normal = outward(contour)
+    offset, known = wall_offsets(contour, normal, walls, wall_normals)
     moved = contour + normal * offset[:, None]
-    polygon, directions, lengths = _straightened(moved, known)
+    polygon, directions, lengths = straightened(moved, known)
     return Outline(polygon, float(known.mean()), directions, lengths)
 
 
@@ -109,15 +108,18 @@ def even_spacing(loop: Array, spacing_mm: float) -> Array:
     return np.stack([np.interp(at, arc, closed[:, k]) for k in range(2)], axis=1)
 
 
-def _outward(contour: Array) -> Array:
+def outward(contour: Array) -> Array:
+    """Return the unit outward normals (S, 2) of an evenly spaced, counter-clockwise closed contour."""
     smooth = gaussian_filter1d(contour, 2.0 / SPACING_MM, axis=0, mode="wrap")
     tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
 
 
-def _wall_offsets(contour: Array, normal: Array, walls: Array, wall_normals: Array) -> tuple[Array, NDArray[np.bool_]]:
+def wall_offsets(contour: Array, normal: Array, walls: Array, wall_normals: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the shift along the contour's normal [mm] that puts it on the walls, and where walls are known."""
+    steep = np.abs(wall_normals[:, 2]) < WALL_SLOPE
+    walls, wall_normals = walls[steep, :2], wall_normals[steep, :2]
     count = len(contour)
     if len(walls) < 20:
         return np.zeros(count), np.zeros(count, dtype=bool)
@@ -127,13 +129,13 @@ def _wall_offsets(contour: Array, normal: Array, walls: Array, wall_normals: Arr
     keep = (np.abs(offset) < WALL_REACH_MM) & (facing > 0.85)
     at, offset = at[keep], offset[keep]
     sigma = SMOOTH_MM / SPACING_MM
-    estimate = np.full(count, float(np.median(offset)) if offset.size else 0.0)
+    estimate: Array = np.full(count, float(np.median(offset)) if offset.size else 0.0)
     support = np.zeros(count)
     for width in (3.0, 2.0, 1.5, 1.0, 1.0, 1.0):
         weight = np.clip(1 - ((offset - estimate[at]) / width) ** 2, 0, None) ** 2
         total = gaussian_filter1d(np.bincount(at, weight, minlength=count), sigma, mode="wrap")
         moment = gaussian_filter1d(np.bincount(at, weight * offset, minlength=count), sigma, mode="wrap")
-        support = total
+        support = np.asarray(total, dtype=np.float64)
         estimate = np.where(total > 0.3, moment / np.maximum(total, 1e-9), estimate)
     known = support > 0.3
     if known.any():
@@ -141,7 +143,7 @@ def _wall_offsets(contour: Array, normal: Array, walls: Array, wall_normals: Arr
     return estimate, np.asarray(known)
 
 
-def _straightened(loop: Array, known: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
+def straightened(loop: Array, known: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
     """Replace runs that are straight within the noise by fitted lines and meet neighbours in sharp corners."""
     import cv2
 

@@ -11,7 +11,7 @@ from eddyscan.core.frames import Array
 from eddyscan.core.technique import Crop
 from eddyscan.surface.axes import align
 from eddyscan.surface.outline import Outline, trace_outline
-from eddyscan.surface.part_finder import CELL_MM, PartRegion, find_part
+from eddyscan.surface.part_finder import CELL_MM, OBJECT_MM, PartRegion, find_part
 from eddyscan.surface.view import View
 
 
@@ -46,7 +46,7 @@ def locate_part(views: Sequence[View], crop: Crop | None = None) -> PartFrame:
     points = np.concatenate([_on_region(region, v.points_in(region.T_box_world, low, high)[0]) for v in views])
     surfels = [v.surfels_in(region.T_box_world, low + np.array([0, 0, 1.0]), high) for v in views]
     walls, normals = (np.concatenate([s[k] for s in surfels]) for k in range(2))
-    outline = trace_outline(points, walls, normals)
+    outline = trace_outline(points[points[:, 2] > _foot_height(region)], walls, normals)
     axes = align(outline, points)
     T = axes.T_part_box @ region.T_box_world
     warnings = list(axes.warnings)
@@ -54,6 +54,11 @@ def locate_part(views: Sequence[View], crop: Crop | None = None) -> PartFrame:
         warnings.append("other objects could be the part: " + "; ".join(region.rivals) + ". Clear the table or crop.")
     del crop
     return PartFrame(T, np.array([*axes.size_mm, region.size_mm[2]]), outline.moved(axes.T_part_box), tuple(warnings))
+
+
+def _foot_height(region: PartRegion) -> float:
+    """Return the height [mm] above which a point cannot be the table's noise."""
+    return float(min(OBJECT_MM, 0.4 * region.size_mm[2]))
 
 
 def _on_region(region: PartRegion, points: Array) -> Array:

@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.ndimage import affine_transform
 
-from eddyscan.core.frames import Array, rotation_about_z, transform
+from eddyscan.core.frames import Array, rotation_about_z
 from eddyscan.surface.height_map import CELL_MM, COARSE, HeightMap
 
 YAWS = 60
 CANDIDATES = 5
 TRUNCATE_MM = 6.0
 MIN_OVERLAP = 0.3  # share of the smaller view's objects that the other must have seen
-SAMPLES = 2500
+SAMPLES = 1500
+REFINED = 3  # coarse peaks worth refining
+FINEST_MM = 0.7  # steps below this are left to the point-to-plane registration
 FFT_SIZE = 180  # coarse maps are 86 cells: twice that, no wrap-around
 
 
@@ -92,10 +94,9 @@ class PairSearch:
         if source not in self._turned:
             angles = np.arange(YAWS) * 360.0 / YAWS
             self._turned[source] = [_spectra(*_turned(*self._coarse[source], a)) for a in angles]
-        candidates = [self._refine(target, source, c) for c in self._peaks(target, source)]
+        candidates = self._candidates(target, source)
         if not candidates:
             return PairPose(target, source, np.eye(4), np.inf, 0.0)
-        candidates.sort(key=lambda c: c[1])
         best = candidates[0]
         rival, rival_yaw = np.inf, 0.0
         for pose, cost, _ in candidates[1:]:
@@ -105,11 +106,22 @@ class PairSearch:
                 break
         return PairPose(target, source, self.pose_matrix(target, source, best[0]), best[1], best[2], rival, rival_yaw)
 
+    def _candidates(self, target: int, source: int) -> list[tuple[Array, float, float]]:
+        """Return refined (pose, cost, overlap), best first: the coarse peaks that a first look leaves."""
+        peaks = [
+            (p, self.cost(target, source, self.pose_matrix(target, source, p))[0]) for p in self._peaks(target, source)
+        ]
+        peaks.sort(key=lambda p: p[1])
+        refined = [self._refine(target, source, p) for p, _ in peaks[:REFINED]]
+        return sorted(refined, key=lambda c: c[1])
+
     def pose_matrix(self, target: int, source: int, pose: Array) -> Array:
         """Return T_target_source for yaw [deg] and the shift [mm] between the maps' middles."""
-        R = rotation_about_z(float(pose[0]))
-        c_target, c_source = np.append(self.maps[target].centre_mm, 0), np.append(self.maps[source].centre_mm, 0)
-        return transform(R, c_target + np.append(pose[1:], 0) - R @ c_source)
+        c, s = np.cos(np.radians(pose[0])), np.sin(np.radians(pose[0]))
+        T = np.eye(4)
+        T[:2, :2] = [[c, -s], [s, c]]
+        T[:2, 3] = self.maps[target].centre_mm + pose[1:] - T[:2, :2] @ self.maps[source].centre_mm
+        return T
 
     def cost(self, target: int, source: int, T_target_source: Array) -> tuple[float, float]:
         """Return the mean truncated height difference [mm] and the overlap at a pose, both ways."""
@@ -155,7 +167,7 @@ class PairSearch:
 
         best = cost(pose)
         step = np.array([3.0, 4.0, 4.0])
-        while step[1] > 0.3:
+        while step[1] > FINEST_MM:
             moved = False
             for axis in range(3):
                 for sign in (1, -1):

@@ -7,7 +7,7 @@ import numpy as np
 from eddyscan.core.depth import DepthImage
 from eddyscan.core.errors import GeometryError
 from eddyscan.core.technique import Surface
-from eddyscan.surface.clean import clean
+from eddyscan.surface.clean import Depth32, clean
 from eddyscan.surface.surfels import surfel_image
 from eddyscan.surface.view import View
 
@@ -27,7 +27,12 @@ def prepare(view: DepthImage, settings: Surface) -> View:
     if kept < MIN_PIXELS:
         raise GeometryError(_nothing_left(view, settings, kept))
     surfels = surfel_image(depth, view.camera)
-    return View(view.name, depth, view.camera, surfels, np.eye(4))
+    return View(view.name, depth, _gated(view, settings), view.camera, surfels, np.eye(4))
+
+
+def _gated(view: DepthImage, settings: Surface) -> Depth32:
+    inside = (view.depth_mm >= settings.range_min_mm) & (view.depth_mm <= settings.range_max_mm)
+    return np.where(inside, view.depth_mm, np.nan).astype(np.float32)
 
 
 def _nothing_left(view: DepthImage, settings: Surface, kept: int) -> str:

@@ -15,15 +15,18 @@ from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.registration import Registration
 from eddyscan.core.technique import Surface
-from eddyscan.surface.fusion import fuse
+from eddyscan.surface.fusion import cells_inside, collect_cells, fuse, is_height_field
+from eddyscan.surface.height_field import rough_height
 from eddyscan.surface.part_frame import PartFrame, locate_part
 from eddyscan.surface.prepare import prepare
 from eddyscan.surface.register import Registered, register
+from eddyscan.surface.sharpen import sharpen
 from eddyscan.surface.study import reconstruct_as_study
 from eddyscan.surface.view import View
 from eddyscan.surface.virtual_camera import as_depth_image
 
 CLOUD_LIMIT = 200_000
+ROUGH_CELL_MM = 2.0
 
 
 @dataclass(frozen=True)
@@ -87,16 +90,36 @@ def reconstruct(
     used = [v for v in registered.views if v is not None]
     progress("finding the part", 0, 1)
     part = locate_part(used, settings.crop)
+    used, part = _sharpened(used, part, registered)
     progress("finding the part", 1, 1)
     surface = fuse(used, part, settings, progress=progress)
     warnings = (*registered.warnings, *part.warnings, *surface.warnings)
     cloud = _merged_cloud(used, part)
-    return Reconstruction(surface.mesh, _in_part_frame(registered, part), cloud, warnings, surface.method)
+    return Reconstruction(surface.mesh, _in_part_frame(registered, used, part), cloud, warnings, surface.method)
 
 
-def _in_part_frame(registered: Registered, part: PartFrame) -> tuple[Registration, ...]:
+def _sharpened(views: list[View], part: PartFrame, registered: Registered) -> tuple[list[View], PartFrame]:
+    """Correct poses and outline by the part's border, when its top is a height field that has one."""
+    if not is_height_field(views, part):
+        return views, part
+    cells = collect_cells(views, part, cell_mm=ROUGH_CELL_MM)
+    top = rough_height(cells, cells_inside(cells, part), margin_mm=6.0)
+    joint = registered.joint
+    result = sharpen(
+        views,
+        part,
+        lambda xy: top.at(xy[:, 0], xy[:, 1]),
+        information=None if joint is None else joint.information,
+        centre=np.zeros(3) if joint is None else joint.centre,
+        reference=registered.reference,
+    )
+    return list(result.views), replace(result.part, warnings=(*part.warnings, *result.part.warnings))
+
+
+def _in_part_frame(registered: Registered, used: list[View], part: PartFrame) -> tuple[Registration, ...]:
+    posed = iter(used)
     return tuple(
-        replace(r, T_target_source=part.T_part_world @ r.T_target_source) if r.converged else r
+        replace(r, T_target_source=part.T_part_world @ next(posed).T_world_camera) if r.converged else r
         for r in registered.registrations
     )
 

@@ -23,9 +23,9 @@ LEVER_MM = 100.0  # rotations are scaled by this length, so all unknowns are mm
 TABLE_WEIGHT = 0.3
 SCALE_FLOOR_MM = 0.05  # quantised depth has zero median deviation: a robust scale needs a floor
 NORMAL_COSINE = 0.8
-OBJECT_SAMPLES = 5000
-TABLE_SAMPLES = 1500
-GATES_MM = (6.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.5, 1.2, 1.2, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+OBJECT_SAMPLES = 3500
+TABLE_SAMPLES = 1000
+GATES_MM = (6.0, 4.0, 3.0, 2.0, 1.5, 1.2, 1.0, 1.0, 1.0, 1.0)
 QUALITY_GATE_MM = 3.0
 CONVERGED_MM = 0.003
 

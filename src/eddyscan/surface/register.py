@@ -28,11 +28,15 @@ class Registered:
     views : posed views in the order given; None where a view was rejected
     registrations : one per view, T_world_view
     warnings : tuple of str
+    joint : normal system of the registration over the used views; None when poses were given
+    reference : index, among the used views, of the one that carries the frame
     """
 
     views: tuple[View | None, ...]
     registrations: tuple[Registration, ...]
     warnings: tuple[str, ...]
+    joint: JointResult | None = None
+    reference: int = 0
 
 
 def register(images: Sequence[DepthImage], views: Sequence[View], *, progress: Progress = silent) -> Registered:
@@ -75,7 +79,7 @@ def _searched(views: Sequence[View], graph: ViewGraph, joint: JointResult, kept:
         posed.append(replace(view, T_world_camera=joint.poses[at]))
         registrations.append(_quality(view.name, joint.poses[at], joint, at))
     warnings = tuple(f"{views[k].name} left out: {why}" for k, why in graph.rejected)
-    return Registered(tuple(posed), tuple(registrations), warnings)
+    return Registered(tuple(posed), tuple(registrations), warnings, joint, kept.index(graph.reference))
 
 
 def _quality(name: str, pose: Array, joint: JointResult, at: int, source: str = "registered") -> Registration:

@@ -37,7 +37,7 @@ class SplineBasis:
         """Return the (N, size) values (or derivatives) at x, clamped to the interval."""
         step = (self.high - self.low) / self.intervals
         knots = self.low + step * np.arange(-DEGREE, self.intervals + DEGREE + 1)
-        inside = np.clip(x, self.low, self.high)
+        inside = np.clip(x, knots[DEGREE], knots[-DEGREE - 1])
         if derivative == 0:
             return np.asarray(BSpline.design_matrix(inside, knots, DEGREE).toarray())
         columns = [

@@ -12,7 +12,8 @@ from eddyscan.core.frames import Array, transform
 from eddyscan.surface.surfels import SurfelImage
 
 SAMPLE = 4000
-HYPOTHESES = 400
+HYPOTHESES = 300
+FIT_POINTS = 40_000
 TOLERANCE_SHARE = 0.004  # of the median distance
 MIN_SHARE = 0.08  # of the view's surfels that must lie on the table
 BELOW_LIMIT = 0.05  # share that may lie below it: nothing hangs under a table
@@ -60,7 +61,8 @@ def table_in(points: Array, name: str, *, seed: int = 0) -> TablePlane:
     pick = rng.choice(len(points), size=min(SAMPLE, len(points)), p=area / area.sum())
     tolerance = TOLERANCE_SHARE * float(np.median(reach))
     plane = _best_plane(points[pick], tolerance, rng)
-    plane, share, below, rms = _refined(points, area / area.sum(), plane, tolerance)
+    every = slice(None, None, max(1, len(points) // FIT_POINTS))
+    plane, share, below, rms = _refined(points[every], area[every] / area[every].sum(), plane, tolerance)
     if share < MIN_SHARE or below > BELOW_LIMIT:
         raise RegistrationError(
             f"no table visible in {name}: its largest plane carries {100 * share:.0f} % of the view (need "

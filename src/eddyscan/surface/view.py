@@ -20,6 +20,7 @@ class View:
     ----------
     name : str
     depth : (H, W) float32 [mm], cleaned, NaN = none
+    raw : (H, W) float32 [mm], range-gated alone, NaN = none
     camera : PinholeCamera
     surfels : SurfelImage
     T_world_camera : (4, 4) pose in the table frame (z = 0 is the table)
@@ -27,6 +28,7 @@ class View:
 
     name: str
     depth: Depth32
+    raw: Depth32
     camera: PinholeCamera
     surfels: SurfelImage
     T_world_camera: Array
@@ -45,7 +47,7 @@ class View:
         range_mm : (N,) distance along the optical axis
         """
         T = T_box_world @ self.T_world_camera
-        rows, columns = _window(self, T, low, high)
+        rows, columns = _window(self.camera, T, low, high)
         patch = self.depth[rows, columns]
         i, j = np.nonzero(np.isfinite(patch))
         z = patch[i, j].astype(np.float64)
@@ -58,21 +60,23 @@ class View:
     def surfels_in(self, T_box_world: Array, low: Array, high: Array) -> tuple[Array, Array]:
         """Return surfel points and normals (N, 3) inside a box, in the box frame."""
         T = T_box_world @ self.T_world_camera
-        valid = self.surfels.valid
-        points = apply(T, self.surfels.points[valid].astype(np.float64))
+        window = _window(self.surfels.camera, T, low, high)
+        patch = self.surfels.points[window]
+        valid = np.isfinite(patch[..., 2])
+        points = apply(T, patch[valid].astype(np.float64))
         inside = ((points >= low) & (points <= high)).all(axis=1)
-        normals = self.surfels.normals[valid][inside].astype(np.float64) @ T[:3, :3].T
+        normals = self.surfels.normals[window][valid][inside].astype(np.float64) @ T[:3, :3].T
         return points[inside], normals
 
 
-def _window(view: View, T_box_camera: Array, low: Array, high: Array) -> tuple[slice, slice]:
+def _window(camera: PinholeCamera, T_box_camera: Array, low: Array, high: Array) -> tuple[slice, slice]:
     """Return the rows and columns of the image that can show the box."""
     corners = np.array(np.meshgrid(*np.stack([low, high], axis=1))).reshape(3, -1).T
     seen = (corners - T_box_camera[:3, 3]) @ T_box_camera[:3, :3]
-    height, width = view.depth.shape
+    height, width = camera.height, camera.width
     if (seen[:, 2] < 1.0).any():
         return slice(0, height), slice(0, width)
-    u = view.camera.fx * seen[:, 0] / seen[:, 2] + view.camera.cx
-    v = view.camera.fy * seen[:, 1] / seen[:, 2] + view.camera.cy
+    u = camera.fx * seen[:, 0] / seen[:, 2] + camera.cx
+    v = camera.fy * seen[:, 1] / seen[:, 2] + camera.cy
     rows = slice(int(np.clip(v.min() - 1, 0, height)), int(np.clip(v.max() + 2, 0, height)))
     return rows, slice(int(np.clip(u.min() - 1, 0, width)), int(np.clip(u.max() + 2, 0, width)))
