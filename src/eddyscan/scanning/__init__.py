@@ -5,6 +5,7 @@ protocols, never a driver or a simulator.
 """
 
 from eddyscan.scanning.checking import check
+from eddyscan.scanning.keep_out import KeepOut
 from eddyscan.scanning.running import run
 
-__all__ = ["check", "run"]
+__all__ = ["KeepOut", "check", "run"]

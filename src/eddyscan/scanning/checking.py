@@ -8,14 +8,24 @@ import numpy as np
 
 from eddyscan.core.errors import TravelError
 from eddyscan.core.frames import Array, checked_transform
+from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.plan import KINDS, ScanPlan
 from eddyscan.core.technique import Technique
 from eddyscan.devices.protocols import Axis
+from eddyscan.scanning.keep_out import KeepOut, refuse_keep_out
 from eddyscan.scanning.targets import stage_targets
 
 
-def check(plan: ScanPlan, stage_axes: Sequence[Axis], T_stage_part: Array, technique: Technique) -> None:
-    """Refuse a plan that would leave the stage's travel; nothing moves.
+def check(
+    plan: ScanPlan,
+    stage_axes: Sequence[Axis],
+    T_stage_part: Array,
+    technique: Technique,
+    *,
+    mesh: SurfaceMesh | None = None,
+    keep_out: Sequence[KeepOut] = (),
+) -> None:
+    """Refuse a plan that would leave the stage's travel, enter the part or a keep-out zone; nothing moves.
 
     Parameters
     ----------
@@ -23,11 +33,14 @@ def check(plan: ScanPlan, stage_axes: Sequence[Axis], T_stage_part: Array, techn
     stage_axes : axes x, y, z as the stage reported them [mm]
     T_stage_part : (4, 4) pose of the part on the stage
     technique : Technique
+    mesh : the surface [part]; without it the spots below the plan's points stand for it
+    keep_out : boxes around clamps and stops [mm, stage]
 
     Raises
     ------
     TravelError
-        When a scan point, link or approach lies outside an axis; names the worst.
+        When a scan point, link or approach lies outside an axis, or a straight
+        way between two of them enters the part or a box; names the worst.
     GeometryError
         When `T_stage_part` is no rigid transform.
     """
@@ -37,6 +50,7 @@ def check(plan: ScanPlan, stage_axes: Sequence[Axis], T_stage_part: Array, techn
     targets = stage_targets(plan, T)
     _refuse_beyond_travel(plan, targets, stage_axes)
     _refuse_no_room_to_lift(plan, targets, stage_axes, technique)
+    refuse_keep_out(plan, targets, T, probe=technique.probe, boxes=keep_out, mesh=mesh)
 
 
 def _refuse_no_room_to_lift(plan: ScanPlan, targets: Array, stage_axes: Sequence[Axis], technique: Technique) -> None:

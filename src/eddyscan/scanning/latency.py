@@ -58,9 +58,10 @@ def measure_latency(scan: Scan, mode: str) -> Latency:
     latency = fit_latency(np.array(times), np.array(values), t, z)
     if not latency.uncertainty_s < LARGEST_UNCERTAINTY_S:
         raise WorkError(
-            f"the delay between readings and positions came out as {1e3 * latency.seconds:.1f} ms with an uncertainty of "
-            f"{1e3 * latency.uncertainty_s:.1f} ms (limit {1e3 * LARGEST_UNCERTAINTY_S:.0f}) from {latency.readings} "
-            "readings above the row's first point. Check that the probe reads the part there, or set scan.mode to step."
+            f"the delay between readings and positions came out as {1e3 * latency.seconds:.1f} ms with an uncertainty "
+            f"of {1e3 * latency.uncertainty_s:.1f} ms (limit {1e3 * LARGEST_UNCERTAINTY_S:.0f}) from "
+            f"{latency.readings} readings above the row's first point. Check that the probe reads the part "
+            "there, or set scan.mode to step."
         )
     scan.sink.note("latency", {**asdict(latency), "mode": mode})
     return latency

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 
 from eddyscan.core.errors import TechniqueError
 from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.record import POSITION_DOUBTFUL, Reading
-from eddyscan.devices.protocols import ImpedanceReading, PathSample, PathStage
+from eddyscan.devices.protocols import ImpedanceReading, PathSample, PathStage, Stage
 from eddyscan.scanning.latency import Latency, measure_latency
-from eddyscan.scanning.stepping import approach_leg, legs, read_point
+from eddyscan.scanning.stepping import approach_leg, hop, legs, read_point
 from eddyscan.scanning.trajectory import RowPath, row_path
 
 if TYPE_CHECKING:
     from eddyscan.scanning.running import Scan
 
 ROUND_S = 0.025  # between two looks at the axes; at 25 mm/s they move 0.6 mm
-DOUBTFUL_TOLERANCES = 3.0  # a moving probe may be this many position tolerances off before a reading is doubted
+HELD_UP_S = 0.3
+DOUBTFUL_TOLERANCES = 2.0  # a moving probe may be this many position tolerances beside its path
+MOST_BEHIND_MM = 0.5  # and this far along it from where the timing has it: its measured place counts
 
 
 def scan_in_rows(scan: Scan, mode: str) -> None:
@@ -38,15 +40,20 @@ def scan_in_rows(scan: Scan, mode: str) -> None:
     latency: Latency | None = None
     for leg, run in strokes(legs(plan.kind, has_reading), plan.row):
         approach_leg(scan, leg, run[0])
+        last, stuck = run[-1], False
         if latency is None:
             latency = measure_latency(scan, mode)
-        if len(run) == 1:
-            read_point(scan, run[0])
-        else:
-            _Stroke(scan, mode, run, latency.seconds).drive()
-        scan.at = run[-1]
-        count += len(run)
-        scan.progress("scan", count, plan.n_scan)
+        while run:
+            if len(run) == 1 or stuck:
+                read_point(scan, run[0])
+                count, run, stuck = count + 1, run[1:], False
+            else:
+                stored = _Stroke(scan, mode, run, latency.seconds).drive()
+                count, run, stuck = count + len(stored), [i for i in run if i not in stored], not stored
+            scan.progress("scan", count, plan.n_scan)
+            if run:
+                hop(scan, scan.targets[run[0]])
+        scan.at = last
 
 
 def strokes(legs_to_go: list[list[int]], row: Sequence[int] | IntArray) -> list[tuple[list[int], list[int]]]:
@@ -64,6 +71,10 @@ def strokes(legs_to_go: list[list[int]], row: Sequence[int] | IntArray) -> list[
     return out
 
 
+class _Drivable(PathStage, Stage, Protocol):
+    """A stage that moves and follows paths."""
+
+
 @dataclass
 class _Stroke:
     """One run of points driven at constant speed."""
@@ -77,10 +88,16 @@ class _Stroke:
     waiting: list[tuple[int, ImpedanceReading]] = field(default_factory=list)
     stamp_delay_s: float = 0.0
     last_round_s: float = 0.0
+    stored: set[int] = field(default_factory=set)
 
-    def drive(self) -> None:
-        """Follow the path, read at every point, and store what is placed."""
-        scan, stage = self.scan, cast(PathStage, self.scan.stage)
+    def drive(self) -> set[int]:
+        """Follow the path, read at every point, store what is placed; return the poses stored.
+
+        When something held this program up for longer than the axes were told to
+        go on, they have come to rest by themselves: what is not stored then is
+        left for another stroke.
+        """
+        scan, stage = self.scan, cast(_Drivable, self.scan.stage)
         path = self._path()
         axes = len(path.path.position[0])
         self._add(PathSample(np.full(axes, scan.clock.now()), path.path.position[0], True))
@@ -88,6 +105,10 @@ class _Stroke:
         self.last_round_s = scan.clock.now()
         next_point, moving = 0, True
         while moving or next_point < len(self.run):
+            if scan.clock.now() - self.last_round_s > HELD_UP_S and moving:
+                stage.stop()
+                scan.sink.note("event", {"event": "held up", "row": int(scan.plan.row[self.run[0]])})
+                return self.stored
             due, round_due = self._due(path, began, next_point), self.last_round_s + ROUND_S
             if due <= round_due or not moving:
                 scan.clock.sleep(min(due - scan.clock.now(), ROUND_S))
@@ -103,6 +124,7 @@ class _Stroke:
             self._store(path, began)
         self._add(PathSample(np.full(axes, scan.clock.now()), scan.stage.position(), False))
         self._store(path, began)
+        return self.stored
 
     def _path(self) -> RowPath:
         scan, points = self.scan, self.scan.targets[self.run]
@@ -138,9 +160,17 @@ class _Stroke:
         for index, heard in placed:
             when = heard.time_s - self.latency_s
             where = np.array([np.interp(when, times[:, k], positions[:, k]) for k in range(positions.shape[1])])
-            planned, _ = path.path.at(when - began)
-            readings.append(self._reading(index, heard, where, float(np.abs(where - planned).max())))
+            readings.append(self._reading(index, heard, where, self._beside(path, when - began, where)))
         self.scan.sink.write(readings)
+        self.stored.update(index for index, _ in placed)
+
+    def _beside(self, path: RowPath, since_s: float, where: Array) -> float:
+        """Return how far [mm] a place is from the path: across it; along it only what is no mere delay."""
+        planned, velocity = path.path.at(since_s)
+        off, speed = where - planned, float(np.linalg.norm(velocity))
+        along = float(off @ velocity) / speed if speed > 0 else 0.0
+        across = float(np.linalg.norm(off - along * velocity / speed if speed > 0 else off))
+        return max(across, abs(along) - MOST_BEHIND_MM)
 
     def _reading(self, index: int, heard: ImpedanceReading, where: Array, off_mm: float) -> Reading:
         scan = self.scan

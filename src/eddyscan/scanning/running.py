@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from eddyscan.core.frames import Array, checked_transform
+from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.plan import ScanPlan
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.technique import Technique
 from eddyscan.devices.protocols import Clock, EddyInstrument, RecordSink, Stage
 from eddyscan.scanning.checking import check
+from eddyscan.scanning.keep_out import KeepOut
 from eddyscan.scanning.rows import scan_in_rows
+from eddyscan.scanning.signals import ended_by_signals
 from eddyscan.scanning.stepping import scan_in_steps
 from eddyscan.scanning.targets import stage_targets, travel_height_mm, with_z
 
@@ -49,6 +52,8 @@ def run(
     technique: Technique,
     T_stage_part: Array,
     progress: Progress = silent,
+    mesh: SurfaceMesh | None = None,
+    keep_out: Sequence[KeepOut] = (),
 ) -> None:
     """Take every reading of the plan that the sink does not hold yet.
 
@@ -62,6 +67,7 @@ def run(
         Readings are durable when its `write` returns; it is left open.
     clock : Clock
         The rig's clock, shared by the stage and the instrument.
+    mesh, keep_out : as for `check`
 
     Raises
     ------
@@ -70,7 +76,7 @@ def run(
     DeviceError, ScanAborted, KeyboardInterrupt, ...
         After the axes were stopped and the probe lifted; what was read is kept.
     """
-    check(plan, stage.axes(), T_stage_part, technique)
+    check(plan, stage.axes(), T_stage_part, technique, mesh=mesh, keep_out=keep_out)
     targets = stage_targets(plan, checked_transform(T_stage_part, "the part's pose on the stage"))
     height = travel_height_mm(targets, stage.axes(), technique)
     scan = Scan(plan, stage, instrument, clock, sink, technique, targets, height, clock.now(), progress)
@@ -96,15 +102,34 @@ def _note_settings(scan: Scan, T_stage_part: Array) -> None:
 @contextlib.contextmanager
 def _always_safe(scan: Scan) -> Iterator[None]:
     """Stop the axes and lift the probe whatever ends the scan; the first fault is the one that is told."""
+    with ended_by_signals():
+        try:
+            yield
+            lift(scan)
+        except BaseException as fault:
+            _make_safe(scan, fault)
+            raise
+
+
+def _make_safe(scan: Scan, fault: BaseException) -> None:
+    """Stop, lift, and note the end; a second Ctrl-C stops the lifting too."""
     try:
-        yield
-        lift(scan)
+        with contextlib.suppress(Exception):
+            scan.stage.stop()
+        try:
+            lift(scan)
+        except Exception:  # the line may have been lost only now: stop opens it again
+            with contextlib.suppress(Exception):
+                scan.stage.stop()
+            try:
+                lift(scan)
+            except Exception as unlifted:
+                fault.add_note(f"The probe could not be lifted: {unlifted} Lift it by hand before anything else moves.")
+        with contextlib.suppress(Exception):
+            scan.sink.note("event", {"event": "ended early", "why": f"{type(fault).__name__}: {fault}"})
     except BaseException:
         with contextlib.suppress(Exception):
             scan.stage.stop()
-        with contextlib.suppress(Exception):
-            lift(scan)
-        raise
 
 
 def lift(scan: Scan) -> None:

@@ -134,6 +134,7 @@ class TimedPoints:
             looker.link.tell(*axis.where, "warnings clear")
         self._device = looker.axes[0].table.device
         self._sequence: Any = looker.link.device_of(self._device).pvt.get_sequence(1)
+        self._call("pvt disable", self._sequence.disable)  # a stroke that was given up leaves it set
         self._call("pvt setup", lambda: self._sequence.setup_live(*[a.table.axis for a in looker.axes]))
         self._call("pvt cork", self._sequence.cork)
         self._feed(AHEAD_S)
