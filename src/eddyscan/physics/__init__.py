@@ -6,10 +6,10 @@ wire's dc resistance. Lengths in mm and conductivities in MS/m at the boundary.
 
 from eddyscan.physics.coil import Coil, air_inductance_h
 from eddyscan.physics.conductor import Conductor, Layer, skin_depth_mm
+from eddyscan.physics.curvature import curved_lift_off_mm, effective_radius_mm, too_curved
 from eddyscan.physics.impedance import impedance_change_ohm, impedance_ohm, least_lift_off_mm
 from eddyscan.physics.lift_off import LiftOffCurve
 from eddyscan.physics.placed import PlacedSlot, slots_change_ohm
-from eddyscan.physics.pose import PoseCurve, curved_lift_off_mm, effective_radius_mm, too_curved
 from eddyscan.physics.slot import Slot, slot_warnings, to_slot_frame
 from eddyscan.physics.slot_solver import SlotSolver, slot_change_ohm
 from eddyscan.physics.tables import SlotTable, build_table, slot_table, table_grid
@@ -20,7 +20,6 @@ __all__ = [
     "Layer",
     "LiftOffCurve",
     "PlacedSlot",
-    "PoseCurve",
     "Slot",
     "SlotSolver",
     "SlotTable",

@@ -23,7 +23,6 @@ after the delta term of the dyadic has cancelled the air-filled slot's own term
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,8 +30,6 @@ import numpy as np
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.physics.coil import MU0
 from eddyscan.physics.conductor import Layer, layer_lambda, normal_admittance, surface_admittance
-
-NEGLIGIBLE = 36.0  # exp(-36) is below double precision
 
 
 @dataclass(frozen=True)
@@ -50,6 +47,11 @@ class DepthProfile:
         if self.down is not None:
             total = total + self.down[:, None] * np.exp(-np.outer(self.lam, z_m + self.thickness_m))
         return np.asarray(total)
+
+    def first(self) -> DepthProfile:
+        """Return the profile of the first wave number alone."""
+        down = None if self.down is None else self.down[:1]
+        return DepthProfile(self.lam[:1], self.up[:1], down, self.thickness_m)
 
 
 Term = tuple[ComplexArray, DepthProfile]
@@ -144,6 +146,3 @@ class SlottedMetal:
         once = np.exp(-lam * self.layer.thickness_m)
         share = surface / (1 + faces[0] * once**2)
         return DepthProfile(lam, share, share * faces[0] * once, self.layer.thickness_m)
-
-
-DepthTransform = Callable[[DepthProfile], ComplexArray]

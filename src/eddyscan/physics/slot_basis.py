@@ -35,14 +35,17 @@ class SlotBasis(Protocol):
     def field_nodes(self, count: int) -> Array:
         """Return places x (count,) [m] where a coil's field is sampled."""
 
-    def line_weights(self, count: int) -> Array:
-        """Return weights (count,) [m] that integrate over x at these places."""
-
     def depth_columns(self, profile: DepthProfile) -> ComplexArray:
         """Return what a depth profile contributes to each column (K, C)."""
 
     def fold(self, samples: ComplexArray) -> ComplexArray:
         """Return Galerkin integrals (P, H, size) of samples (P, count, H, C): places along x, columns in depth."""
+
+    def line_columns(self, profile: DepthProfile) -> ComplexArray:
+        """Return what a depth profile contributes to each quadrature column of the along-slot field (K, Q)."""
+
+    def line_fold(self, samples: ComplexArray) -> ComplexArray:
+        """Return samples (P, count, H, Q) times sqrt(dS) (P, H, ...), so that a sum of squares is an integral."""
 
 
 def chebyshev_nodes(half_length_m: float, count: int) -> Array:

@@ -12,12 +12,10 @@ from scipy.special import j1
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.physics.coil import Coil, source, wave_numbers
 from eddyscan.physics.metal import SlottedMetal
-from eddyscan.physics.quadrature import gauss_panels
 from eddyscan.physics.slot_basis import SlotBasis
 
 VALUES_PER_CHUNK = 4_000_000
 RADII_PER_MEAN_RADIUS = 80
-LINE_DEPTHS = 8
 
 
 @dataclass(frozen=True)
@@ -65,9 +63,7 @@ class CoilOnSlot:
         self._across = self._spline(radii, bessel, scale, basis.depth_columns(profile))
         self._along: BSpline | None = None
         if metal.opening_m > 0:
-            t, wt = gauss_panels(np.array([0.0, 1.0]), LINE_DEPTHS)
-            self._line_weights = np.sqrt(metal.sigma * metal.opening_m * basis.line_weights(self._count))
-            columns = profile.values(-basis.depth_m * t) * np.sqrt(basis.depth_m * wt)
+            columns = np.sqrt(metal.sigma * metal.opening_m) * basis.line_columns(profile)
             self._along = self._spline(radii, bessel, scale, columns)
 
     def _spline(self, radii: Array, bessel: Array, scale: ComplexArray, columns: ComplexArray) -> BSpline:
@@ -94,6 +90,4 @@ class CoilOnSlot:
     def _along_values(self, r: Array, dy: Array) -> ComplexArray:
         if self._along is None or not dy.any():
             return np.zeros((len(r), self._heights, 1), dtype=np.complex128)
-        weight = dy * self._line_weights
-        values = self._sampled(self._along, r) * weight[..., None, None]
-        return np.asarray(values.transpose(0, 2, 1, 3)).reshape(len(r), self._heights, -1)
+        return self._basis.line_fold(self._sampled(self._along, r) * dy[..., None, None])

@@ -13,10 +13,12 @@ from functools import lru_cache
 import numpy as np
 
 from eddyscan.core.frames import Array, ComplexArray, IntArray
-from eddyscan.physics.bessel_rules import product_rule
+from eddyscan.physics.bessel_rules import ProductRule, product_rule
 from eddyscan.physics.metal import DepthProfile, SlottedMetal
 from eddyscan.physics.quadrature import gauss_panels
 from eddyscan.physics.slot_basis import chebyshev_nodes, fejer_weights
+
+LINE_DEPTHS = 8
 
 
 @dataclass(frozen=True)
@@ -35,40 +37,51 @@ class RectangleBasis:
 
     def matrix(self, metal: SlottedMetal) -> ComplexArray:
         """Return the symmetric Galerkin matrix (size, size) of the sheet's own field."""
-        c, d = self.half_length_m, self.depth_m
-        scales = [c, d, metal.skin_m, max(metal.opening_m, 0.02 * min(c, d, metal.skin_m))]
-        if metal.layer.thickness_m is not None:
-            scales.append(metal.layer.thickness_m)
-        smallest, largest = 0.02 / max(scales), 20.0 / min(scales)
-        x_orders = np.arange(1, self.along + 1)
-        z_orders = 2 * np.arange(self.down) + 1
-        x_rule = product_rule(x_orders, smallest=smallest * c, largest=largest * c)
-        z_rule = product_rule(z_orders, smallest=smallest * d, largest=largest * d)
-        px = x_rule.products * (_signs(x_orders, x_rule.pairs) * np.pi**2 * c)[:, None]
-        pz = z_rule.products * (_signs(z_orders, z_rule.pairs) * np.pi**2 * d)[:, None]
-        u, w = x_rule.nodes / c, z_rule.nodes / d
-        plane = px @ metal.plane_kernel(u[:, None] ** 2 + w**2) @ pz.T / (2 * np.pi**2)
-        edge = self._surface_terms(metal, u, px, z_rule.pairs, smallest)
-        return self._assemble(plane + edge, x_rule.pairs, z_rule.pairs)
+        return self.plane_matrix(metal) + self.surface_matrix(metal)
 
-    def _surface_terms(
-        self, metal: SlottedMetal, u: Array, px: Array, z_pairs: IntArray, smallest: float
-    ) -> ComplexArray:
-        keep = u < 400 / min(self.half_length_m, self.depth_m, metal.skin_m)
-        u, px = u[keep], px[:, keep]
+    def plane_matrix(self, metal: SlottedMetal) -> ComplexArray:
+        """Return the part of the slot doubled by its mirror image (size, size)."""
+        x_rule, px, z_rule, pz = self._rules(metal)
+        u, w = x_rule.nodes / self.half_length_m, z_rule.nodes / self.depth_m
+        plane = px @ metal.plane_kernel(u[:, None] ** 2 + w**2) @ pz.T / (2 * np.pi**2)
+        return self._assemble(plane, x_rule.pairs, z_rule.pairs)
+
+    def surface_matrix(self, metal: SlottedMetal) -> ComplexArray:
+        """Return the rest, of rank one in depth at each wave number (size, size)."""
+        x_rule, px, z_rule, _ = self._rules(metal)
         shortest = min(self.half_length_m, self.depth_m, metal.skin_m)
-        edges = smallest * 3.0 ** np.arange(np.log(1e3 / shortest / smallest) / np.log(3))
+        u = x_rule.nodes / self.half_length_m
+        keep = u < 400 / shortest
+        u, px, z_pairs = u[keep], px[:, keep], z_rule.pairs
+        lowest = self._scales(metal)[0]
+        edges = lowest * 3.0 ** np.arange(np.log(1e3 / shortest / lowest) / np.log(3))
         v, wv = gauss_panels(np.concatenate([[0.0], edges]), 7)
         total = np.zeros((len(px), len(z_pairs)), dtype=np.complex128)
         for start in range(0, len(u), 64):
             rows = slice(start, start + 64)
-            uu, vv = np.repeat(u[rows], len(v)), np.tile(v, len(u[rows]))
-            for weight, profile in metal.terms(uu, vv):
+            for weight, profile in metal.terms(np.repeat(u[rows], len(v)), np.tile(v, len(u[rows]))):
                 depth = self.depth_transform(profile)
                 pair = depth[:, z_pairs[:, 0]] * depth[:, z_pairs[:, 1]] * weight[:, None]
-                folded = np.einsum("v,uvp->up", wv, pair.reshape(-1, len(v), len(z_pairs)))
-                total += px[:, rows] @ folded
-        return total / np.pi**2
+                total += px[:, rows] @ np.einsum("v,uvp->up", wv, pair.reshape(-1, len(v), len(z_pairs)))
+        return self._assemble(total / np.pi**2, x_rule.pairs, z_pairs)
+
+    def _scales(self, metal: SlottedMetal) -> tuple[float, float]:
+        """Return the smallest and largest wave numbers [1/m] that matter."""
+        c, d = self.half_length_m, self.depth_m
+        scales = [c, d, metal.skin_m, max(metal.opening_m, 0.02 * min(c, d, metal.skin_m))]
+        if metal.layer.thickness_m is not None:
+            scales.append(metal.layer.thickness_m)
+        return 0.02 / max(scales), 20.0 / min(scales)
+
+    def _rules(self, metal: SlottedMetal) -> tuple[ProductRule, Array, ProductRule, Array]:
+        smallest, largest = self._scales(metal)
+        x_orders, z_orders = np.arange(1, self.along + 1), 2 * np.arange(self.down) + 1
+        c, d = self.half_length_m, self.depth_m
+        x_rule = product_rule(x_orders, smallest=smallest * c, largest=largest * c)
+        z_rule = product_rule(z_orders, smallest=smallest * d, largest=largest * d)
+        px = x_rule.products * (_signs(x_orders, x_rule.pairs) * np.pi**2 * c)[:, None]
+        pz = z_rule.products * (_signs(z_orders, z_rule.pairs) * np.pi**2 * d)[:, None]
+        return x_rule, px, z_rule, pz
 
     def _assemble(self, values: ComplexArray, x_pairs: IntArray, z_pairs: IntArray) -> ComplexArray:
         full = np.zeros((self.along, self.down, self.along, self.down), dtype=np.complex128)
@@ -94,9 +107,16 @@ class RectangleBasis:
         """Return places x (count,) [m] along the slot where a coil's field is sampled."""
         return chebyshev_nodes(self.half_length_m, count)
 
-    def line_weights(self, count: int) -> Array:
-        """Return weights (count,) [m] that integrate over x at these places."""
-        return fejer_weights(self.half_length_m, count)
+    def line_columns(self, profile: DepthProfile) -> ComplexArray:
+        """Return the profile at quadrature depths, times the square root of their weights (K, Q)."""
+        t, weight = gauss_panels(np.array([0.0, 1.0]), LINE_DEPTHS)
+        return np.asarray(profile.values(-self.depth_m * t) * np.sqrt(self.depth_m * weight))
+
+    def line_fold(self, samples: ComplexArray) -> ComplexArray:
+        """Return samples (P, count, H, Q) times the square root of the area they stand for (P, H, count * Q)."""
+        places, count, heights, _ = samples.shape
+        weighted = samples * np.sqrt(fejer_weights(self.half_length_m, count))[:, None, None]
+        return np.asarray(weighted.transpose(0, 2, 1, 3)).reshape(places, heights, -1)
 
     def depth_columns(self, profile: DepthProfile) -> ComplexArray:
         """Return what a depth profile contributes to each column (K, down)."""

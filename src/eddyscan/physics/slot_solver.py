@@ -23,11 +23,13 @@ from eddyscan.physics.conductor import Conductor
 from eddyscan.physics.metal import SlottedMetal
 from eddyscan.physics.slot import Slot, slotted_layer
 from eddyscan.physics.slot_basis import SlotBasis
+from eddyscan.physics.slot_ellipse import EllipseBasis
 from eddyscan.physics.slot_field import CoilOnSlot, Drive
 from eddyscan.physics.slot_rectangle import RectangleBasis
 
 DEEPEST_SKIN_DEPTHS = 8.0
 MOST_ALONG = 64
+MOST_DEGREE = 40
 
 
 class SlotSolver:
@@ -149,9 +151,17 @@ def slot_basis(slot: Slot, metal: SlottedMetal, detail_m: float, functions: tupl
             f"length_mm = {slot.length_mm:g}: must be at most {longest:.3g} mm for a coil of mean radius "
             f"{detail_m / MM:g} mm. Cut the slot to the stretch the coil passes."
         )
+    if slot.profile == "semi-elliptic":
+        degree = max(functions) if functions else int(20 + 0.5 * (along - 18) + 0.5 * slot.depth_m / metal.skin_m)
+        if degree > MOST_DEGREE:
+            raise TechniqueError(
+                f"depth_mm = {slot.depth_mm:g} is {slot.depth_m / metal.skin_m:.0f} skin depths and length_mm = "
+                f"{slot.length_mm:g}: a semi-elliptic slot needs degree {degree}, at most {MOST_DEGREE} is solved. "
+                "Use a lower frequency, a larger coil or profile = 'rectangular'."
+            )
+        return EllipseBasis(slot.half_length_m, slot.depth_m, degree)
     depth = min(slot.depth_m, DEEPEST_SKIN_DEPTHS * metal.skin_m)
-    down = 11 + int(depth / metal.skin_m)
-    along, down = functions or (along, down)
+    along, down = functions or (along, 11 + int(depth / metal.skin_m))
     return RectangleBasis(slot.half_length_m, depth, along, down)
 
 
