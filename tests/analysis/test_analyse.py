@@ -2,13 +2,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-import sound_scan
 
 from eddyscan.analysis import analyse
 from eddyscan.core.errors import GeometryError, InputError
 from eddyscan.core.frames import rotation_about_z, transform
 from eddyscan.core.parts import named_part
 from eddyscan.core.record import OVERLOAD
+
+from . import sound_scan
 
 FINE = sound_scan.technique(
     plan={"pitch_mm": 0.5, "step_mm": 0.5, "machine": "xyz-tilt"}, scan={"lift_off_mm": 0.2}, probe={"tip": "flat"}

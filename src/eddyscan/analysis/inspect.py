@@ -8,7 +8,6 @@ import numpy as np
 
 from eddyscan.analysis.background import explained, robust_sigma, slow_along_rows
 from eddyscan.analysis.detection import blob_score
-from eddyscan.analysis.edges import distance_to_rim_mm, edge_zone_mm
 from eddyscan.analysis.indications import Signals, find_indications
 from eddyscan.analysis.mapping import map_to_surface
 from eddyscan.analysis.readings import Readings, usable
@@ -18,7 +17,9 @@ from eddyscan.core.frames import Array, BoolArray
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.record import ScanRecord
+from eddyscan.core.rim import edge_zone_mm, rim_of
 from eddyscan.core.technique import Technique
+from eddyscan.physics import Conductor
 from eddyscan.physics.sound_response import (
     Projection,
     SoundResponse,
@@ -64,7 +65,7 @@ def analyse(
     readings = usable(record, technique.drive.frequency_hz)
     below = footing(mesh, readings.part_mm, axis=probe_axis(readings, technique))
     progress("lift-off", 1, 4)
-    response = response_for(technique, readings.air_ohm, largest_tilt_deg=float(below.tilt_deg.max()))
+    response = response_for(technique, readings, largest_tilt_deg=float(below.tilt_deg.max()))
     projection = response.project(readings.impedance_ohm, below.tilt_deg)
     lift_off = projection.lift_off_mm - curvature_gap_mm(response.coil, projection.lift_off_mm, below.curvature_per_mm)
     progress("residual", 2, 4)
@@ -95,16 +96,21 @@ def probe_axis(readings: Readings, technique: Technique) -> Array | None:
     return readings.axis if technique.plan.machine == "xyz" else None
 
 
-def response_for(technique: Technique, air_ohm: complex | None, *, largest_tilt_deg: float) -> SoundResponse:
-    """Return the sound part's curve for a technique and the coil's air reading [ohm]."""
-    coil = technique_coil(technique)
-    if air_ohm is not None:
-        coil = coil_by_air_reading(coil, air_ohm, technique.drive.frequency_hz)
+def response_for(technique: Technique, readings: Readings, *, largest_tilt_deg: float) -> SoundResponse:
+    """Return the sound part's curve: the coil as calibrated, else by its air reading, else as drawn."""
+    coil, air = technique_coil(technique), readings.air_ohm
+    if readings.coil is not None:
+        coil = readings.coil
+    elif air is not None:
+        coil = coil_by_air_reading(coil, air, technique.drive.frequency_hz)
+    conductor = technique_conductor(technique)
+    if readings.conductivity_ms_m is not None:
+        conductor = Conductor.half_space(readings.conductivity_ms_m)
     return sound_response(
         coil,
-        technique_conductor(technique),
+        conductor,
         technique.drive.frequency_hz,
-        air_ohm=air_ohm,
+        air_ohm=air,
         largest_lift_off_mm=2.0 * technique.analysis.lift_off_max_mm + 1.0,
         largest_tilt_deg=largest_tilt_deg,
     )
@@ -128,7 +134,7 @@ def _signals(
     width = FOOTPRINT_IN_MEAN_RADII * (probe.inner_radius_mm + probe.outer_radius_mm) / 2
     score = blob_score(across, below.foot_mm, width_mm=width)
     near = np.nan_to_num(projection.lift_off_mm, nan=np.inf) <= technique.analysis.lift_off_max_mm
-    inside = distance_to_rim_mm(mesh, below.foot_mm) > edge_zone_mm(probe.outer_radius_mm)
+    inside = rim_of(mesh).distance_mm(below.foot_mm) > edge_zone_mm(probe.outer_radius_mm)
     return Signals(
         below.foot_mm, below.normal, readings.row, 1j * across * falling, score, near & inside, robust_sigma(across)
     )

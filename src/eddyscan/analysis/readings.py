@@ -10,6 +10,7 @@ import numpy as np
 from eddyscan.core.errors import InputError
 from eddyscan.core.frames import Array, BoolArray, ComplexArray, IntArray
 from eddyscan.core.record import OUT_OF_RANGE, OVERLOAD, POSITION_DOUBTFUL, ScanRecord
+from eddyscan.physics import Coil
 
 LEAST_READINGS = 5
 FREQUENCY_TOLERANCE = 1e-3
@@ -34,6 +35,10 @@ class Readings:
         machine that cannot tilt.
     air_ohm : complex or None
         What the instrument read with the coil in air.
+    coil : Coil or None
+        As calibrated before the scan.
+    conductivity_ms_m : float or None
+        Of the metal, found with the coil.
     """
 
     index: IntArray
@@ -43,6 +48,8 @@ class Readings:
     impedance_ohm: ComplexArray
     axis: Array
     air_ohm: complex | None = None
+    coil: Coil | None = None
+    conductivity_ms_m: float | None = None
 
     def __len__(self) -> int:
         return len(self.index)
@@ -88,7 +95,22 @@ def usable(record: ScanRecord, frequency_hz: float) -> Readings:
         record.impedance_ohm[good],
         axis,
         air_reading(record.meta),
+        *calibrated_coil(record.meta),
     )
+
+
+def calibrated_coil(meta: dict[str, Any]) -> tuple[Coil | None, float | None]:
+    """Return coil and conductivity from a record's `meta` under `coil`, None where it holds none."""
+    value = meta.get("coil")
+    if not isinstance(value, dict):
+        return None, None
+    keys = ("inner_radius_mm", "outer_radius_mm", "length_mm", "turns")
+    sizes = [float(value[key]) for key in keys if isinstance(value.get(key), int | float)]
+    missing = [key for key in keys if not isinstance(value.get(key), int | float)]
+    if missing:
+        raise InputError(f"the record's coil calibration lacks {', '.join(missing)}. Calibrate the coil again.")
+    conductivity = value.get("conductivity_ms_m")
+    return Coil(*sizes), float(conductivity) if isinstance(conductivity, int | float) else None
 
 
 def air_reading(meta: dict[str, Any]) -> complex | None:

@@ -36,38 +36,53 @@ class Footing:
     curvature_per_mm: Array
 
 
+class SmoothSurface:
+    """A mesh as quadrics fitted around a thinned set of its vertices.
+
+    Camera noise in single normals does not reach tilt and distance.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+    radius_mm : float [mm]
+        The fit's weights fall to exp(-2) here.
+    """
+
+    def __init__(self, mesh: SurfaceMesh, radius_mm: float = 6.0) -> None:
+        self._mesh = mesh
+        self._vertices = KDTree(mesh.vertices)
+        self._centres = _thinned(mesh, radius_mm / 2)
+        self._fits = _quadrics(mesh, self._vertices, self._centres, radius_mm)
+        self._near_centre = KDTree(mesh.vertices[self._centres])
+
+    def below(self, points_mm: Array, *, axis: Array | None = None) -> Footing:
+        """Return the surface below points (M, 3); arguments and errors of `footing`."""
+        _require_near(self._vertices, points_mm)
+        origin = self._mesh.vertices[self._centres]
+        start = self._mesh.vertices[_query(self._vertices, points_mm)]
+        foot, normal, curvature = _feet(origin, self._fits, _query(self._near_centre, start), points_mm)
+        foot, normal, curvature = _feet(origin, self._fits, _query(self._near_centre, foot), points_mm)
+        distance = ((points_mm - foot) * normal).sum(axis=1)
+        cosine = np.ones(len(foot)) if axis is None else np.clip(-(normal @ axis), -1.0, 1.0)
+        return Footing(foot, normal, distance, np.degrees(np.arccos(cosine)), curvature)
+
+
 def footing(mesh: SurfaceMesh, points_mm: Array, *, axis: Array | None, radius_mm: float = 6.0) -> Footing:
     """Find where readings look, on a smooth fit of the mesh.
-
-    Quadrics are fitted to the mesh around a thinned set of vertices, so that camera
-    noise in single normals does not reach the tilt.
 
     Parameters
     ----------
     mesh : SurfaceMesh
     points_mm : (M, 3) coil face centres [mm, part]
     axis : (3,) direction of the probe [part], or None when the probe stands on the normal
-    radius_mm : float [mm]
-        Standard distance of the fit's weights is a half of this.
+    radius_mm : float [mm] size of the fit's window
 
     Raises
     ------
     GeometryError
         When most readings are nowhere near the mesh.
     """
-    tree = KDTree(mesh.vertices)
-    _require_near(tree, points_mm)
-    centres = _thinned(mesh, radius_mm / 2)
-    fits = _quadrics(mesh, tree, centres, radius_mm)
-    near_centre = KDTree(mesh.vertices[centres])
-    nearest = _query(tree, points_mm)
-    position = _query(near_centre, mesh.vertices[nearest])
-    foot, normal, curvature = _feet(mesh.vertices[centres], fits, position, points_mm)
-    position = _query(near_centre, foot)
-    foot, normal, curvature = _feet(mesh.vertices[centres], fits, position, points_mm)
-    distance = ((points_mm - foot) * normal).sum(axis=1)
-    cosine = np.ones(len(foot)) if axis is None else np.clip(-(normal @ axis), -1.0, 1.0)
-    return Footing(foot, normal, distance, np.degrees(np.arccos(cosine)), curvature)
+    return SmoothSurface(mesh, radius_mm).below(points_mm, axis=axis)
 
 
 def _query(tree: KDTree, points_mm: Array) -> IntArray:
