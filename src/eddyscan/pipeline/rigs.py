@@ -16,6 +16,8 @@ RIG_HEADING = """The rig: it changes with a spanner. As written here it is the v
 simulated stage and instrument on the loopback. A real rig needs
 `eddyscan run DIR --rig lab.toml --arm` every time."""
 
+PLACING_MM = 2.0  # a part is set on the stage by eye, so not all of the z travel lies where the part needs it
+
 
 def virtual_rig_text(part: str, seed: int) -> str:
     """Return a commented rig.toml of the virtual cell."""
@@ -75,5 +77,6 @@ class LazyRig:
         return self._rig
 
     def travel_mm(self) -> tuple[float, float, float] | None:
-        """Return the x, y, z travels the plan has to fit into, as rig.toml states them."""
-        return self.settings().travel_mm
+        """Return the x, y, z travels the plan has to fit into: rig.toml's, less what placing the part costs in z."""
+        x_mm, y_mm, z_mm = self.settings().travel_mm
+        return x_mm, y_mm, z_mm - PLACING_MM
