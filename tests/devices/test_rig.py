@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from eddyscan.core.errors import InputError, TechniqueError
+from eddyscan.core.errors import DeviceError, InputError, LinkError, TechniqueError
 from eddyscan.core.technique import Drive
 from eddyscan.devices.clock import ScaledClock, WallClock
 from eddyscan.devices.protocols import DepthCamera, EddyInstrument, Identity, Stage
@@ -122,3 +122,43 @@ def test_virtual_rig_homes_moves_and_reads_through_the_real_libraries():
         log = rig.cell.truth_log()
         assert log["lift_off_mm"][-1] == pytest.approx(0.5, abs=0.9)
         assert len(log["time_s"]) == 2
+
+
+def quick_world(**changes):
+    return RigSettings.model_validate(
+        {"world": {"part": "plate", "seed": 2, "flaws": "none", **changes.pop("world", {})}, **changes}
+    )
+
+
+@pytest.mark.parametrize("kind", ["SR830", "SR860"])
+def test_a_lock_in_can_stand_in_the_cell(kind):
+    driver = {"driver": f"eddyscan.devices.drivers.sr830:{kind}"}
+    with open_rig(quick_world(world={"instrument": {"kind": kind}}, instrument=driver)) as rig:
+        rig.instrument.configure(Drive(frequency_hz=100e3))
+        z = rig.instrument.read().impedance_ohm
+        assert rig.instrument.identity().model.endswith(kind)
+        assert 6.0 < z.imag < 9.0
+        log = rig.cell.truth_log()
+        assert log["reactance_ohm"][-1] == pytest.approx(z.imag, rel=1e-6)
+
+
+def go_along_x(stage):
+    for place in np.linspace(1.0, 150.0, 60):
+        stage.move(np.array([place, 50.0, 38.0]))
+
+
+def test_a_stall_of_the_world_stops_the_stage_with_a_message():
+    faults = {"stage_fault": "stall", "stage_fault_after": 300, "stage_fault_axis": "x"}
+    with open_rig(quick_world(world={"faults": faults})) as rig:
+        rig.stage.home()
+        with pytest.raises(DeviceError, match="axis x reports a stall"):
+            go_along_x(rig.stage)
+
+
+def test_a_lost_instrument_is_a_link_error():
+    patience = {"options": {"timeout_s": 1.0}}
+    with open_rig(quick_world(world={"faults": {"lcr_link_lost_after": 1}}, instrument=patience)) as rig:
+        rig.instrument.configure(Drive())
+        rig.instrument.read()
+        with pytest.raises(LinkError, match="failed to read"):
+            rig.instrument.read()

@@ -18,12 +18,13 @@ from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.devices.protocols import Clock
 from eddyscan.devices.sim.camera import VirtualDepthCamera
 from eddyscan.devices.sim.lcr import LcrSimulator
+from eddyscan.devices.sim.lockin import LockInSimulator
 from eddyscan.devices.sim.world_facts import facts_of
 from eddyscan.devices.sim.world_placement import operators_pose, surface_pose
 from eddyscan.devices.sim.world_probe import ProbeOverPart, StagePosition, TrueReading
 from eddyscan.devices.sim.world_scene import build_scene
 from eddyscan.devices.sim.world_settings import WorldSettings
-from eddyscan.devices.sim.zaber import ZaberSimulator
+from eddyscan.devices.sim.zaber import Fault, ZaberSimulator
 from eddyscan.devices.sim.zaber_settings import ZaberSettings
 
 __all__ = ["CellAddresses", "VirtualCell", "WorldSettings"]
@@ -81,24 +82,30 @@ class VirtualCell:
     @cached_property
     def stage(self) -> ZaberSimulator:
         """The simulated controller: faults are injected here."""
-        s = self.settings.stage
+        s, faults = self.settings.stage, self.settings.faults
         options = ZaberSettings(
             layout=s.layout, firmware=s.firmware, reply_delay_s=s.reply_delay_s, seed=self.settings.seed
         )
-        return ZaberSimulator(options, self.clock)
+        simulator = ZaberSimulator(options, self.clock)
+        if faults.stage_fault != "none":
+            simulator.inject(Fault(faults.stage_fault, after=faults.stage_fault_after, axis=faults.stage_fault_axis))
+        return simulator
 
     @cached_property
-    def instrument(self) -> LcrSimulator:
-        """The simulated meter."""
-        o = self.settings.instrument
+    def instrument(self) -> LcrSimulator | LockInSimulator:
+        """The simulated meter or lock-in."""
+        o, faults = self.settings.instrument, self.settings.faults
+        coil = CoilAtStage(self._probe, self.stage.true_position, self.clock)
+        if o.kind != "E4980A":
+            return LockInSimulator(coil, self.clock, model=o.kind, series_ohm=o.series_ohm, faults=faults)
         return LcrSimulator(
-            CoilAtStage(self._probe, self.stage.true_position, self.clock),
+            coil,
             self.clock,
             short_s=o.short_s,
             latency_s=o.latency_s,
             digits=o.digits,
             overload_ohm=o.overload_ohm,
-            faults=self.settings.faults,
+            faults=faults,
         )
 
     def camera(self) -> VirtualDepthCamera:

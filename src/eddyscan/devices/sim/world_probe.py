@@ -118,5 +118,5 @@ class ProbeOverPart:
 
 
 def reading_key(impedance_ohm: complex) -> tuple[str, str]:
-    """Return what tells one reading from another: both parts to nine digits, the noise makes them unique."""
-    return f"{impedance_ohm.real:.8e}", f"{impedance_ohm.imag:.8e}"
+    """Return what tells one reading from another: both parts to seven digits, the noise makes them unique."""
+    return f"{impedance_ohm.real:.6e}", f"{impedance_ohm.imag:.6e}"

@@ -49,6 +49,8 @@ class WorldCoil(Section):
 class WorldInstrument(Section):
     """Eddy-current instrument of the virtual cell: every imperfection by name."""
 
+    kind: Literal["E4980A", "SR830", "SR860"] = Field("E4980A", description="which one answers; name its driver too")
+    series_ohm: float = Field(1000.0, gt=0, description="resistor before the coil of a lock-in, ohm")
     noise: float = Field(1e-4, ge=0, description="white noise of a short reading, relative to the air reactance")
     flicker: float = Field(3e-5, ge=0, description="1/f noise per decade of time, relative to the air reactance")
     drift_k: float = Field(1.0, ge=0, description="temperature swing over the drift period, K")
@@ -104,6 +106,11 @@ class WorldFaults(Section):
     lcr_link_lost_after: int = Field(0, ge=0, description="instrument closes its link after this many readings")
     lcr_silent_after: int = Field(0, ge=0, description="instrument stops answering after this many readings")
     lcr_overload_every: int = Field(0, ge=0, description="every so many readings one overloads")
+    stage_fault: Literal["none", "drop-link", "delay", "garble", "silence", "stall", "driver-off", "power-cycle"] = (
+        Field("none", description="what the stage controller does once")
+    )
+    stage_fault_after: int = Field(0, ge=0, description="after this many commands")
+    stage_fault_axis: Literal["x", "y", "z"] = "x"
     part_shift_after: int = Field(0, ge=0, description="the part is knocked after this many readings")
     part_shift_mm: tuple[float, float, float] = Field((0.8, -0.5, 0.0), description="by how much, mm")
 
