@@ -143,7 +143,7 @@ def test_a_lock_in_can_stand_in_the_cell(kind):
 
 
 def go_along_x(stage):
-    for place in np.linspace(1.0, 150.0, 60):
+    for place in 1.0 + 149.0 * (np.arange(2000) % 7) / 6:
         stage.move(np.array([place, 50.0, 38.0]))
 
 
