@@ -31,6 +31,8 @@ class Procedure(Section):
     operator: str = "not stated"
     operator_level: str = "not stated"
     reviewer: str = "not stated"
+    reference_block: str = Field("not stated", description="its number and notches")
+    instrument_calibration_due: str = "not stated"
     place: str = "not stated"
 
 
@@ -43,6 +45,7 @@ class Part(Section):
     drawing: str = "not stated"
     material: str = "aluminium alloy"
     heat_treatment: str = "not stated"
+    coating: str = "not stated"
     conductivity_ms_m: float = Field(19.0, gt=0.1, le=65.0, description="MS/m; copper is 58")
 
 
@@ -77,6 +80,7 @@ class Probe(Section):
 
     name: str = "pencil 3 mm"
     serial: str = "not stated"
+    calibration_due: str = "not stated"
     inner_radius_mm: float = Field(0.5, gt=0)
     outer_radius_mm: float = Field(1.5, gt=0)
     length_mm: float = Field(1.0, gt=0)
@@ -120,6 +124,13 @@ class Scan(Section):
     """Motion and reading."""
 
     mode: Literal["step", "row", "pvt"] = "step"
+    alignment: Literal["field", "corner"] = Field(
+        "field", description="field: the coil finds the part from the operator's rough corner; corner: the corner holds"
+    )
+    passes: Literal[1, 2] = Field(2, description="2: a coarse pass maps the lift-off, the fine one runs corrected")
+    coarse_pitch_mm: float = Field(
+        5.0, gt=0, description="row and point distance of the coarse pass, not below the plan's"
+    )
     lift_off_mm: float = Field(0.5, gt=0, le=10, description="coil to surface, along the normal")
     speed_mm_s: float = Field(25.0, gt=0, le=500, description="probe speed along the surface")
     approach_speed_mm_s: float = Field(5.0, gt=0, le=100)

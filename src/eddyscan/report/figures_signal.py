@@ -43,7 +43,9 @@ def reading_maps(record: ScanRecord, residual_ohm: ComplexArray | None, lift_off
 def readings_figure(record: ScanRecord, maps: dict[str, Array], theme: Theme) -> Figure:
     """Draw every reading where it was taken, one map per channel, raw."""
     part, rows = record.part_mm, (len(maps) + 1) // 2
-    figure, panels = canvas(height_in=map_height_in(part, 4.5, extra_in=0.95) * rows, rows=rows, columns=2, squeeze=False)
+    figure, panels = canvas(
+        height_in=map_height_in(part, 4.5, extra_in=0.95) * rows, rows=rows, columns=2, squeeze=False
+    )
     for panel, (title, values) in zip(panels.flat, maps.items(), strict=False):
         known = np.isfinite(values)
         drawn = panel.scatter(

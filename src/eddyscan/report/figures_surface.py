@@ -44,7 +44,10 @@ def profile(mesh: SurfaceMesh, nominal: NominalComparison | None) -> Profile:
     strip = np.digitize(points[:, 0], edges) - 1
     _, strip = np.unique(strip, return_inverse=True)
     x_mm, z_mm, nominal_mm = (_mean(values, strip) for values in (points[:, 0], points[:, 2], expected))
-    along = expected if nominal is not None else np.interp(points[:, 0], x_mm, z_mm)
+    along = expected
+    if nominal is None:
+        slope = np.gradient(z_mm, x_mm) if len(x_mm) > 1 else np.zeros(1)
+        along = z_mm[strip] + slope[strip] * (points[:, 0] - x_mm[strip])
     off = points[:, 2] - along
     spread = np.sqrt(_mean((off - _mean(off, strip)[strip]) ** 2, strip))
     return Profile(x_mm, z_mm, spread, nominal_mm)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +31,35 @@ NO_SCAN = Note("Nothing was scanned.", "missing")
 
 def references(content: ReportContent) -> Section:
     """Show the responses of the reference block before and after the scan."""
-    entries = [] if content.record is None else as_entries(content.record.meta.get("references"))
+    entries = reference_entries(content)
     if not entries:
         text = "No reference check is recorded, so amplitudes are not related to a reference notch."
         return Section("references", "Reference checks", "", (Note(text, "missing"),))
-    return Section("references", "Reference checks", "", (table_of(entries, "Responses of the reference block"),))
+    blocks: list[Block] = [table_of(entries, "Responses of the reference block, before and after")]
+    failed = sum(entry.get("passed") is False for entry in entries)
+    if failed:
+        text = (
+            f"{failed} of {len(entries)} reference checks failed: "
+            "what was scanned since the last good one counts as not examined."
+        )
+        blocks.append(Note(text, "warning"))
+    return Section("references", "Reference checks", "", tuple(blocks))
+
+
+def reference_entries(content: ReportContent) -> list[dict[str, Any]]:
+    """Return what the record noted of its runs over the reference block, in order."""
+    return [] if content.record is None else as_entries(content.record.meta.get("references"))
+
+
+def reference_amplitude(entries: Sequence[Mapping[str, Any]]) -> tuple[float, str] | None:
+    """Return amplitude [ohm] and name of the first reference notch, or None when no check states one."""
+    for entry in entries:
+        milli = entry.get("amplitude_mohm")
+        amplitude = entry.get("amplitude_ohm", None if milli is None else 1e-3 * milli)
+        if amplitude:
+            depth = entry.get("notch_depth_mm")
+            return float(amplitude), "the reference notch" if depth is None else f"the {depth:g} mm reference notch"
+    return None
 
 
 def signals(content: ReportContent) -> Section:
@@ -107,9 +133,11 @@ def indications(content: ReportContent) -> Section:
         return Section("indications", title, "", (Note("The signals were not analysed for indications.", "missing"),))
     level = content.technique.analysis.threshold_mad
     lead = f"Called where the residual exceeds {level:g} robust standard deviations of itself over the part."
+    if content.record is not None:
+        lead += f" {false_call_basis(level, len(content.record))}"
     if not content.indications:
         return Section("indications", title, lead, (Note("No indication in the examined area.", "good"),))
-    blocks: list[Block] = [indication_table(content.indications)]
+    blocks: list[Block] = [indication_table(content.indications, reference_amplitude(reference_entries(content)))]
     if content.record is not None and len(content.record):
         for one in content.indications:
             x, y, z = one.centre_mm
@@ -121,8 +149,14 @@ def indications(content: ReportContent) -> Section:
     return Section("indications", title, lead, tuple(blocks))
 
 
-def indication_table(found: Sequence[Indication]) -> Table:
-    """Return the table an auditor expects, one line per indication."""
+def false_call_basis(level: float, readings: int) -> str:
+    """Say how many false calls Gaussian noise alone would give."""
+    expected = readings * math.erfc(level / math.sqrt(2.0))
+    return f"Gaussian noise alone would cross that level {number(expected, 2)} times in {readings} readings."
+
+
+def indication_table(found: Sequence[Indication], reference: tuple[float, str] | None = None) -> Table:
+    """Return the table an auditor expects, one line per indication; dB against the reference notch when it is known."""
     rows = tuple(
         (
             str(one.number),
@@ -130,6 +164,7 @@ def indication_table(found: Sequence[Indication]) -> Table:
             f"{one.extent_mm:.1f}",
             f"{one.angle_deg:.0f}",
             number(1000 * one.amplitude_ohm),
+            *([] if reference is None else [f"{20 * math.log10(one.amplitude_ohm / reference[0]):+.1f}"]),
             f"{one.phase_deg:.0f}",
             f"{one.snr:.1f}",
             plus_minus(one.length_mm, one.length_uncertainty_mm),
@@ -146,10 +181,12 @@ def indication_table(found: Sequence[Indication]) -> Table:
         "extent [mm]",
         "angle [°]",
         "amplitude [mΩ]",
+        *([] if reference is None else ["re notch [dB]"]),
         "phase [°]",
         "SNR",
         "length [mm]",
         "depth [mm]",
         "class",
     )
-    return Table(columns, rows, "Indications, part frame", frozenset({11}))
+    title = "Indications, part frame" + ("" if reference is None else f"; dB re {reference[1]}")
+    return Table(columns, rows, title, frozenset({len(columns) - 1}))
