@@ -27,7 +27,7 @@ class Drive:
     across : (P, H, size) complex128
         Galerkin integrals of E_y [V/A, basis units].
     along : (P, H, Q) complex128
-        sqrt(sigma a dS) E_x at the slot's quadrature points.
+        sqrt(sigma a dS) E_x at the slot's quadrature points; Q = 0 where it vanishes.
     """
 
     across: ComplexArray
@@ -40,17 +40,28 @@ class CoilOnSlot:
     The field in the metal is azimuthal (Dodd and Deeds 1968):
     E_phi(r, z) = -j omega mu0 i I integral of M(k) exp(-k h) (1 + Gamma)/2 f(z) J1(k r) dk.
     Its depth integrals are tabulated once over the radius r, as splines of E_phi / r.
+    `samples` places along the slot are used at least: two coils that are to react
+    need the same number.
     """
 
-    def __init__(self, coil: Coil, metal: SlottedMetal, basis: SlotBasis, *, reach_m: float, lift_off_m: Array) -> None:
+    def __init__(
+        self,
+        coil: Coil,
+        metal: SlottedMetal,
+        basis: SlotBasis,
+        *,
+        reach_m: float,
+        lift_off_m: Array,
+        samples: int = 0,
+    ) -> None:
         self._basis = basis
         k, w = wave_numbers(coil, reach_m=reach_m, finest_m=float(lift_off_m.min()))
         strength = np.abs(source(coil, k)) * np.exp(-k * lift_off_m.min())
         keep = k <= k[strength > 1e-8 * strength.max()].max()
         k, w = k[keep], w[keep]
         detail = k[strength[keep] > 1e-3 * strength.max()].max()
-        self._count = int(10 + 0.5 * basis.highest_order + 0.6 * detail * basis.half_length_m)
-        self._nodes = basis.field_nodes(self._count)
+        self.samples = max(samples, int(10 + 0.5 * basis.highest_order + 0.6 * detail * basis.half_length_m))
+        self._nodes = basis.field_nodes(self.samples)
         profile = metal.coil_profile(k)
         amplitude = -metal.j_omega_mu * coil.turn_density * w * source(coil, k)
         scale = amplitude * np.exp(-np.outer(lift_off_m, k))
@@ -74,7 +85,7 @@ class CoilOnSlot:
     def drives(self, x_m: Array, y_m: Array) -> Iterator[tuple[slice, Drive]]:
         """Yield (which positions, their Drive) in chunks for coil axes at x, y (N,), (N,) [m, slot frame]."""
         columns = self._across.c.shape[1]
-        step = max(1, VALUES_PER_CHUNK // (self._count * columns))
+        step = max(1, VALUES_PER_CHUNK // (self.samples * columns))
         for start in range(0, len(x_m), step):
             part = slice(start, min(start + step, len(x_m)))
             dx = self._nodes - x_m[part, None]
@@ -89,5 +100,5 @@ class CoilOnSlot:
 
     def _along_values(self, r: Array, dy: Array) -> ComplexArray:
         if self._along is None or not dy.any():
-            return np.zeros((len(r), self._heights, 1), dtype=np.complex128)
+            return np.zeros((len(r), self._heights, 0), dtype=np.complex128)
         return self._basis.line_fold(self._sampled(self._along, r) * dy[..., None, None])

@@ -11,6 +11,8 @@ The second term is the metal missing from the current that runs along the slot
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import inv
@@ -70,19 +72,20 @@ class SlotSolver:
         self.basis = slot_basis(slot, self.metal, detail_mm * MM, functions)
         self._inverse = inv(self.basis.matrix(self.metal))
 
-    def coil(self, coil: Coil, *, reach_mm: float, lift_off_mm: Array) -> CoilOnSlot:
+    def coil(self, coil: Coil, *, reach_mm: float, lift_off_mm: Array, samples: int = 0) -> CoilOnSlot:
         """Prepare a coil for positions within `reach_mm` of every slot point and lift-offs (H,) [mm]."""
         checks.lift_offs(lift_off_mm)
-        return CoilOnSlot(
-            coil, self.metal, self.basis, reach_m=reach_mm * MM, lift_off_m=lift_off_mm * MM + self._coating_m
-        )
+        heights = lift_off_mm * MM + self._coating_m
+        return CoilOnSlot(coil, self.metal, self.basis, reach_m=reach_mm * MM, lift_off_m=heights, samples=samples)
 
     def reaction_ohm(self, receiver: Drive, driver: Drive) -> ComplexArray:
         """Return b'^T A^-1 b plus the along-slot term (P, H) [ohm] of two drives at the same positions."""
         solved = driver.across.reshape(-1, self.basis.size) @ self._inverse
         across = np.einsum("ij,ij->i", solved, receiver.across.reshape(-1, self.basis.size))
-        along = np.einsum("phq,phq->ph", receiver.along, driver.along)
-        return np.asarray(across.reshape(along.shape) + along)
+        total = across.reshape(driver.across.shape[:2])
+        if receiver.along.shape[2] and driver.along.shape[2]:
+            total = total + np.einsum("phq,phq->ph", receiver.along, driver.along)
+        return np.asarray(total)
 
     def change_ohm(self, coil: Coil, x_mm: ArrayLike, y_mm: ArrayLike, lift_off_mm: ArrayLike) -> ComplexArray:
         """Return dZ of one coil at positions x, y in the slot's frame, for each of several lift-offs.
@@ -118,8 +121,11 @@ class SlotSolver:
         x, y = np.broadcast_arrays(np.atleast_1d(np.asarray(x_mm, float)), np.asarray(y_mm, float))
         same = driver == receiver and receiver_offset_mm == (0.0, 0.0)
         far = np.hypot(np.abs(x).max() + 0.5 * self.slot.length_mm, np.abs(y).max()) + np.hypot(*receiver_offset_mm)
-        drive = self.coil(driver, reach_mm=float(far), lift_off_mm=heights)
-        listen = drive if same else self.coil(receiver, reach_mm=float(far), lift_off_mm=heights)
+        prepare = partial(self.coil, reach_mm=float(far), lift_off_mm=heights)
+        drive = prepare(driver)
+        listen = drive if same else prepare(receiver, samples=drive.samples)
+        if listen.samples > drive.samples:
+            drive = prepare(driver, samples=listen.samples)
         result = np.empty((len(x), len(heights)), dtype=np.complex128)
         x2, y2 = (x + receiver_offset_mm[0]) * MM, (y + receiver_offset_mm[1]) * MM
         for part, one in drive.drives(x * MM, y * MM):
