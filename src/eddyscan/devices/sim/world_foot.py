@@ -5,12 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from eddyscan.core.frames import Array
 from eddyscan.core.parts import Hemisphere, NominalPart
 
 GRID_MM = 4.0
+NEWTON_STEPS = 8
 STENCIL = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]], dtype=float)
+
+
+First = tuple[Array, Array]
+Second = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,7 @@ class FootFinder:
         self._part = part
         U, V = part.grid(GRID_MM)
         self._u, self._v = U.ravel(), V.ravel()
-        self._points = part.surface(self._u, self._v)
+        self._tree = KDTree(part.surface(self._u, self._v))
         self._low = np.array([part.u_range[0], part.v_range[0]])
         self._high = np.array([part.u_range[1], part.v_range[1]])
         self._step = 1e-4 * (self._high - self._low)
@@ -53,49 +59,59 @@ class FootFinder:
         """Return the foot of a point (3,) [mm, part]."""
         if isinstance(self._part, Hemisphere):
             return _dome_foot(self._part, point_mm)
-        start = int(((self._points - point_mm) ** 2).sum(axis=1).argmin())
-        uv: Array = np.array([self._u[start], self._v[start]])
-        for _ in range(6):
-            S, J, H = self._local(uv)
-            r = S - point_mm
-            step = self._newton_step(uv, J.T @ r, J.T @ J + np.tensordot(H, r, axes=1), J.T @ J)
-            uv += step
-            if np.abs(step).max() < 1e-9 * np.abs(self._high - self._low).max():
+        start = int(self._tree.query(point_mm)[1])
+        uv = np.array([self._u[start], self._v[start]])
+        small = 1e-6 * (self._high - self._low)
+        for _ in range(NEWTON_STEPS):
+            S, S_u, S_v, second = self._local(uv)
+            step = self._newton_step(uv, S - point_mm, (S_u, S_v), second)
+            if (np.abs(step) <= small).all():
                 break
-        return self._foot(uv, point_mm)
+            uv = uv + step
+        S = S + step[0] * S_u + step[1] * S_v
+        return self._foot(uv + step, point_mm, S, (S_u, S_v), second)
 
-    def _newton_step(self, uv: Array, gradient: Array, hessian: Array, gauss: Array) -> Array:
-        """Return a step that lowers the distance and stays inside the parameter rectangle."""
-        at_limit = ((uv <= self._low) & (gradient > 0)) | ((uv >= self._high) & (gradient < 0))
-        matrix = hessian if np.linalg.det(hessian) > 0 and hessian[0, 0] > 0 else gauss
-        if at_limit.all():
-            return np.zeros(2)
-        if at_limit.any():
-            free = int(np.flatnonzero(~at_limit)[0])
-            step: Array = np.zeros(2)
-            step[free] = -gradient[free] / max(matrix[free, free], 1e-12)
+    def _newton_step(self, uv: Array, r: Array, first: First, second: Second) -> Array:
+        """Return a step that lowers the distance |r| and stays inside the parameter rectangle."""
+        S_u, S_v = first
+        p, q = float(S_u @ r), float(S_v @ r)
+        a, b, c = float(S_u @ S_u), float(S_u @ S_v), float(S_v @ S_v)
+        fa, fb, fc = (m + float(d @ r) for m, d in zip((a, b, c), second, strict=True))
+        if fa > 0 and fa * fc > fb * fb:
+            a, b, c = fa, fb, fc
+        stuck_u, stuck_v = self._stuck(0, uv, p), self._stuck(1, uv, q)
+        if stuck_u or stuck_v:
+            du, dv = (0.0 if stuck_u else -p / a), (0.0 if stuck_v else -q / c)
         else:
-            step = np.asarray(-np.linalg.solve(matrix, gradient), dtype=np.float64)
-        return np.asarray(np.clip(uv + step, self._low, self._high) - uv)
+            du, dv = (b * q - c * p) / (a * c - b * b), (b * p - a * q) / (a * c - b * b)
+        goal = (
+            min(max(value + d, low), high)
+            for value, d, low, high in zip(uv, (du, dv), self._low, self._high, strict=True)
+        )
+        return np.array(list(goal)) - uv
 
-    def _local(self, uv: Array) -> tuple[Array, Array, Array]:
-        """Return S (3,), J (3, 2) and second derivatives H (2, 2, 3) from one nine-point stencil."""
+    def _stuck(self, k: int, uv: Array, gradient: float) -> bool:
+        """Return whether parameter k is at a limit that the distance pulls it beyond."""
+        return bool((uv[k] <= self._low[k] and gradient > 0) or (uv[k] >= self._high[k] and gradient < 0))
+
+    def _local(self, uv: Array) -> tuple[Array, Array, Array, Second]:
+        """Return S, S_u, S_v and (S_uu, S_uv, S_vv), each (3,), from one nine-point stencil."""
         at = uv + STENCIL * self._step
         P = self._part.surface(at[:, 0], at[:, 1])
         eu, ev = self._step
-        J = np.stack([(P[1] - P[2]) / (2 * eu), (P[3] - P[4]) / (2 * ev)], axis=1)
+        S_uu = (P[1] + P[2] - 2 * P[0]) / eu**2
         S_uv = (P[5] + P[6] - P[7] - P[8]) / (4 * eu * ev)
-        H = np.array([[(P[1] + P[2] - 2 * P[0]) / eu**2, S_uv], [S_uv, (P[3] + P[4] - 2 * P[0]) / ev**2]])
-        return P[0], J, H
+        S_vv = (P[3] + P[4] - 2 * P[0]) / ev**2
+        return P[0], (P[1] - P[2]) / (2 * eu), (P[3] - P[4]) / (2 * ev), (S_uu, S_uv, S_vv)
 
-    def _foot(self, uv: Array, point_mm: Array) -> Foot:
-        S, J, H = self._local(uv)
-        n = np.cross(J[:, 0], J[:, 1])
-        n /= np.linalg.norm(n)
-        first = J.T @ J
-        curvature = -float(np.trace(np.linalg.solve(first, H @ n)))
-        metric = np.sqrt(np.diag(first))
-        inside = float((np.minimum(uv - self._low, self._high - uv) * metric).min())
+    def _foot(self, uv: Array, point_mm: Array, S: Array, first: First, second: Second) -> Foot:
+        S_u, S_v = first
+        n = np.cross(S_u, S_v)
+        n = n / np.sqrt(n @ n)
+        a, b, c = float(S_u @ S_u), float(S_u @ S_v), float(S_v @ S_v)
+        L, M, N = (float(d @ n) for d in second)
+        curvature = -(L * c - 2 * M * b + N * a) / (a * c - b * b)
+        inside = float((np.minimum(uv - self._low, self._high - uv) * (a**0.5, c**0.5)).min())
         away = point_mm - S
         height = float(away @ n)
         sideways = float(np.linalg.norm(away - height * n))
