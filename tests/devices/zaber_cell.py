@@ -36,7 +36,7 @@ def zaber_cell(clock, settings: ZaberSettings | None = None, *, home: bool = Tru
     settings = settings or ZaberSettings()
     simulator = ZaberSimulator(settings, clock)
     host, port = simulator.start()
-    driver = {"axes": axes_of(settings), "request_timeout_s": 0.5, **driver}
+    driver = {"axes": axes_of(settings), "request_timeout_s": 0.5, "dead_man": False, **driver}
     try:
         stage = ZaberStage(ZaberStageSettings(host=host, port=port, **driver), clock)
         try:

@@ -9,6 +9,7 @@ import numpy as np
 
 from eddyscan.core.errors import MotionError
 from eddyscan.core.frames import Array, IntArray
+from eddyscan.devices.dead_man import DeadMan
 from eddyscan.devices.drivers.zaber_axes import HARMLESS, ConnectedAxis, connect_axes, speeds_to_arrive_together
 from eddyscan.devices.drivers.zaber_link import Told, ZaberLink
 from eddyscan.devices.drivers.zaber_paths import Follower, Looker, SteeredChain, TimedPoints
@@ -46,6 +47,8 @@ class ZaberStage:
         except BaseException:
             self._link.close()
             raise
+        where = (settings.host, settings.port) if settings.host else str(settings.serial_port)
+        self._dead_man = DeadMan(where, b"/stop\n") if settings.dead_man else None
 
     # -- who it is ---------------------------------------------------------------
 
@@ -164,6 +167,8 @@ class ZaberStage:
             for axis in self._axes:
                 axis.restore(self._link)
             self._link.close()
+            if self._dead_man is not None:
+                self._dead_man.dismiss()
 
     # -- how it waits ------------------------------------------------------------------
 

@@ -49,6 +49,8 @@ class ZaberStageSettings(Section):
     request_timeout_s: float = Field(1.0, gt=0, description="wall time the library waits for an answer")
     read_retries: int = Field(1, ge=0, le=5, description="a position request that got no answer is repeated")
 
+    dead_man: bool = Field(True, description="a second process stops the axes when this one is killed")
+
     @model_validator(mode="after")
     def _one_way_in(self) -> ZaberStageSettings:
         if (self.host is None) == (self.serial_port is None):

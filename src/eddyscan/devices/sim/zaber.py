@@ -143,6 +143,8 @@ class ZaberSimulator:
         with contextlib.suppress(OSError), peer.sock.makefile("rb") as lines:
             for line in lines:
                 self._respond(peer, line)
+        with contextlib.suppress(OSError):
+            peer.sock.close()
         if peer in self._peers:
             self._peers.remove(peer)
 
