@@ -9,8 +9,6 @@ look*, and the wall's points say where the edge is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +17,14 @@ from scipy.ndimage import gaussian_filter1d
 from eddyscan.core.errors import GeometryError
 from eddyscan.core.frames import Array
 from eddyscan.surface.nearest import nearest
+from eddyscan.surface.sides import straightened
 
 CELL_MM = 0.5
+BRIDGE = 21  # cells: bites narrower than this are glare or shadow, seen again when the edges are measured
 SPACING_MM = 1.0
 WALL_SLOPE = 0.35  # |n_z| of a wall's normal at most
 WALL_REACH_MM = 3.0
 SMOOTH_MM = 4.0
-STRAIGHT_MIN_MM = 20.0
-STRAIGHT_RMS_MM = 0.25
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ def trace_outline(points: Array, walls: Array, wall_normals: Array) -> Outline:
     normal = outward(contour)
     offset, known = wall_offsets(contour, normal, walls, wall_normals)
     moved = contour + normal * offset[:, None]
-    polygon, directions, lengths = straightened(moved, known)
+    polygon, directions, lengths = straightened(moved, known, rough=True)
     return Outline(polygon, float(known.mean()), directions, lengths)
 
 
@@ -80,7 +78,8 @@ def _footprint_contour(points: Array) -> Array:
     count = np.bincount(cell[:, 0] * shape[1] + cell[:, 1], minlength=int(shape.prod())).reshape(shape)
     typical = float(np.median(count[count > 0]))
     solid = (count >= max(1.0, 0.15 * typical)).astype(np.uint8)
-    solid = cv2.morphologyEx(solid, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+    solid = cv2.morphologyEx(np.pad(solid, BRIDGE), cv2.MORPH_CLOSE, np.ones((BRIDGE, BRIDGE), np.uint8))
+    solid = solid[BRIDGE:-BRIDGE, BRIDGE:-BRIDGE]
     solid = cv2.morphologyEx(solid, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
     contours, _ = cv2.findContours(solid, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
@@ -141,67 +140,3 @@ def wall_offsets(contour: Array, normal: Array, walls: Array, wall_normals: Arra
     if known.any():
         estimate = np.where(known, estimate, np.median(estimate[known]))
     return estimate, np.asarray(known)
-
-
-def straightened(loop: Array, known: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
-    """Replace runs that are straight within the noise by fitted lines and meet neighbours in sharp corners."""
-    import cv2
-
-    corners = cv2.approxPolyDP(loop.astype(np.float32)[:, None], 1.0, True)[:, 0]
-    starts = sorted(int(np.argmin(np.linalg.norm(loop - c, axis=1))) for c in corners)
-    sides = []
-    for begin, end in pairwise([*starts, starts[0] + len(loop)]):
-        index = np.arange(begin, end + 1) % len(loop)
-        sides.append((index, _fit_line(loop[index], known[index])))
-    pieces: list[Any] = []
-    for k, (index, line) in enumerate(sides):
-        before, after = sides[k - 1][1], sides[(k + 1) % len(sides)][1]
-        if line is None:
-            pieces.append(loop[index[1:-1]])
-            continue
-        first = _meeting(before, line) if before is not None else _foot(line, loop[index[0]])
-        last = _meeting(line, after) if after is not None else _foot(line, loop[index[-1]])
-        pieces.append(np.stack([first, last]))
-    straight = [(line, len(index) * SPACING_MM) for index, line in sides if line is not None]
-    directions = np.array([np.degrees(np.arctan2(line[3], line[2])) for line, _ in straight])
-    return _without_repeats(np.concatenate(pieces)), directions, np.array([length for _, length in straight])
-
-
-def _without_repeats(loop: Array) -> Array:
-    keep = np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1) > 1e-6
-    return np.asarray(loop[keep])
-
-
-def _fit_line(points: Array, known: NDArray[np.bool_]) -> Array | None:
-    """Return (4,) a point and a unit direction of a robust line, or None when the run is not straight."""
-    length = (len(points) - 1) * SPACING_MM
-    if length < STRAIGHT_MIN_MM:
-        return None
-    trim = int(min(6.0, length / 5) / SPACING_MM)
-    middle = points[trim : len(points) - trim]
-    weight = np.where(known[trim : len(points) - trim], 1.0, 0.1)
-    centre, direction, residual = middle.mean(axis=0), middle[-1] - middle[0], np.zeros(len(middle))
-    for _ in range(5):
-        centre = np.average(middle, axis=0, weights=weight)
-        offset = middle - centre
-        _, vectors = np.linalg.eigh((offset * weight[:, None]).T @ offset)
-        direction = vectors[:, 1] * np.sign(vectors[:, 1] @ (middle[-1] - middle[0]))
-        residual = offset @ np.array([-direction[1], direction[0]])
-        scale = max(0.05, 1.4826 * float(np.median(np.abs(residual))))
-        weight = np.where(known[trim : len(points) - trim], 1.0, 0.1)
-        weight = weight * np.clip(1 - (residual / (4.685 * scale)) ** 2, 0, None) ** 2 + 1e-9
-    if float(np.sqrt(np.average(residual**2, weights=weight))) > STRAIGHT_RMS_MM:
-        return None
-    return np.concatenate([centre, direction])
-
-
-def _meeting(a: Array, b: Array) -> Array:
-    cross = a[2] * b[3] - a[3] * b[2]
-    if abs(cross) < 0.2:
-        return np.asarray((a[:2] + b[:2]) / 2)
-    reach = ((b[0] - a[0]) * b[3] - (b[1] - a[1]) * b[2]) / cross
-    return np.asarray(a[:2] + reach * a[2:])
-
-
-def _foot(line: Array, point: Array) -> Array:
-    return np.asarray(line[:2] + ((point - line[:2]) @ line[2:]) * line[2:])

@@ -113,7 +113,9 @@ def _sharpened(views: list[View], part: PartFrame, registered: Registered) -> tu
         centre=np.zeros(3) if joint is None else joint.centre,
         reference=registered.reference,
     )
-    return list(result.views), replace(result.part, warnings=(*part.warnings, *result.part.warnings))
+    return list(result.views), replace(
+        result.part, warnings=tuple(dict.fromkeys((*part.warnings, *result.part.warnings)))
+    )
 
 
 def _in_part_frame(registered: Registered, used: list[View], part: PartFrame) -> tuple[Registration, ...]:

@@ -16,9 +16,10 @@ import numpy as np
 from eddyscan.core.frames import Array, apply, from_rotation_vector, invert
 from eddyscan.surface.axes import align
 from eddyscan.surface.edges import Height, measure_edges
-from eddyscan.surface.outline import Outline, even_spacing, outward, straightened, wall_offsets
+from eddyscan.surface.outline import Outline, even_spacing, outward, wall_offsets
 from eddyscan.surface.part_frame import PartFrame
 from eddyscan.surface.refine import LEVER_MM
+from eddyscan.surface.sides import straightened
 from eddyscan.surface.view import View
 
 PASSES = 2
