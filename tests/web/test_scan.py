@@ -184,7 +184,7 @@ def test_axes_stop_when_the_door_dies(inspection):
 
 
 def test_slow_page_holds_up_nobody_and_nothing_piles_up(served, inspection):
-    behave(inspection, readings=20_000, batch=50, interval_s=0.01)
+    behave(inspection, readings=20_000, batch=200, interval_s=0.02)
     visitor = served.visitor()
     with visitor.live(max_queue=1) as stuck, visitor.live() as quick:
         began = psutil.Process(served.door.bench.worker_pid).memory_info().rss
