@@ -213,7 +213,12 @@ def test_maps_show_changes_from_the_median() -> None:
 def test_the_headline_counts_and_never_says_good_without_a_scan() -> None:
     content = small_inspection()
     assert headline(content).verdict.startswith("2 indications above the call level")
-    assert headline(dataclasses.replace(content, indications=())).kind == "good"
+    fine = content.technique.plan.model_copy(update={"pitch_mm": 0.5, "step_mm": 0.5})
+    dense = dataclasses.replace(content, technique=content.technique.model_copy(update={"plan": fine}), indications=())
+    assert headline(dense).kind == "good"
+    sparse = headline(dataclasses.replace(content, indications=()))
+    assert sparse.kind == "missing"
+    assert "too far apart to exclude short flaws" in sparse.verdict
     assert headline(dataclasses.replace(content, indications=None)).kind == "missing"
 
 

@@ -46,7 +46,15 @@ def _verdict(content: ReportContent) -> tuple[str, Literal["missing", "warning",
     if count:
         noun = "indication" if count == 1 else "indications"
         return f"{count} {noun} above the call level, for a qualified person to classify.", "warning"
+    if gap_between_readings_mm(content) is not None:
+        return "No indication above the call level; readings stand too far apart to exclude short flaws.", "missing"
     return "No indication above the call level in the examined area.", "good"
+
+
+def gap_between_readings_mm(content: ReportContent) -> float | None:
+    """Return the wider of pitch and step [mm] when it exceeds the coil, so a flaw may lie between; else None."""
+    widest = max(content.technique.plan.pitch_mm, content.technique.plan.step_mm)
+    return widest if widest > 2 * content.technique.probe.outer_radius_mm else None
 
 
 def _indications(content: ReportContent) -> Tile:

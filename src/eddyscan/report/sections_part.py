@@ -6,6 +6,7 @@ from typing import Any
 
 from eddyscan.report.blocks import Block, Note, Section
 from eddyscan.report.content import ReportContent
+from eddyscan.report.headline import gap_between_readings_mm
 from eddyscan.report.tables import as_entries, facts_of, settings_facts, table_of
 
 DEVICES = ("stage", "instrument", "camera")
@@ -25,6 +26,12 @@ def result(content: ReportContent) -> Section:
         blocks.extend(Note(f"Deviation from the procedure: {text}", "warning") for text in content.deviations)
     elif content.record is not None:
         blocks.append(Note("No deviation from the procedure was recorded.", "plain"))
+    gap, coil = gap_between_readings_mm(content), 2 * content.technique.probe.outer_radius_mm
+    if gap is not None and content.record is not None:
+        text = (
+            f"Readings stand up to {gap:g} mm apart, the coil is {coil:g} mm wide: a flaw between them gives no signal."
+        )
+        blocks.append(Note(text, "warning"))
     blocks.extend(Note(text, "warning") for text in content.notes)
     return Section("result", "Result", "", tuple(blocks))
 
