@@ -75,10 +75,16 @@ def test_every_step_is_done_and_the_summary_says_so(inspected: Path) -> None:
     summary = json.loads((inspected / "summary.json").read_text())
     assert set(summary["steps"].values()) == {"done"}
     assert summary["coverage"] > 0.9
-    assert summary["plan"]["points"] == count_readings(inspected)
+    assert 2 * summary["plan"]["points"] == count_readings(inspected)  # a coarse and a corrected pass
     assert summary["truth"]["surface"]["own"]["mean_abs_mm"] < 0.5
     assert summary["truth"]["path"]["readings"] == summary["plan"]["points"]
     assert set(summary["seconds"]) >= {"views", "surface", "plan", "record", "cscan", "report"}
+
+
+def test_the_corrected_pass_runs_at_the_techniques_lift_off(inspected: Path) -> None:
+    error = json.loads((inspected / "summary.json").read_text())["truth"]["path"]["lift_off_error_mm"]
+    assert abs(error["mean"]) < 0.05
+    assert error["sd"] < 0.03
 
 
 def test_the_report_stands_alone(inspected: Path) -> None:
@@ -106,7 +112,7 @@ def test_csv_of_the_record_follows_the_contract(inspected: Path, tmp_path: Path)
         "reading,row,point,time_s,x_mm,y_mm,z_mm,x_stage_mm,y_stage_mm,z_stage_mm,"
         "frequency_hz,resistance_ohm,reactance_ohm,lift_off_mm,flag"
     )
-    assert len(lines) - 1 == count_readings(inspected)
+    assert 2 * (len(lines) - 1) == count_readings(inspected)  # the corrected pass is the record
 
 
 def test_a_killed_scan_goes_on_without_loss_or_doubles(fresh: Path) -> None:
@@ -127,8 +133,10 @@ def test_a_killed_scan_goes_on_without_loss_or_doubles(fresh: Path) -> None:
     summary = pipeline.run(folder)
     assert summary["plan"]["points"] > kept
     with closing(sqlite3.connect(folder / "4-record" / "record.sqlite")) as db:
-        total, distinct = db.execute("SELECT count(*), count(DISTINCT row * 100000 + point) FROM readings").fetchone()
-    assert total == distinct == summary["plan"]["points"]
+        total, distinct = db.execute(
+            "SELECT count(*), count(DISTINCT (pass * 1000 + row) * 100000 + point) FROM readings"
+        ).fetchone()
+    assert total == distinct == 2 * summary["plan"]["points"]
 
 
 def test_a_dry_run_moves_nothing(fresh: Path) -> None:

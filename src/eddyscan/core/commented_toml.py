@@ -29,7 +29,7 @@ def commented_toml(settings: BaseModel, heading: str = "") -> str:
 
 def limits_in_words(field: FieldInfo) -> str:
     """Return a field's limits and choices, for example "> 0, <= 10" or "step | row | pvt"."""
-    choices = [value for value in _literal_values(field.annotation)]
+    choices = _literal_values(field.annotation)
     if choices:
         return " | ".join(choices)
     words = []

@@ -125,7 +125,8 @@ class Scan(Section):
 
     mode: Literal["step", "row", "pvt"] = "step"
     alignment: Literal["field", "corner"] = Field(
-        "field", description="field: the coil finds the part from the operator's rough corner; corner: the corner holds"
+        "corner",
+        description="field: the coil finds the part from the operator's rough corner; corner: the corner holds",
     )
     passes: Literal[1, 2] = Field(2, description="2: a coarse pass maps the lift-off, the fine one runs corrected")
     coarse_pitch_mm: float = Field(
@@ -137,6 +138,8 @@ class Scan(Section):
     clearance_mm: float = Field(5.0, gt=0, description="height above the surface for links")
     settle_s: float = Field(0.05, ge=0, le=10, description="wait between arrival and reading")
     position_tolerance_mm: float = Field(0.05, gt=0)
+    watch_rows: int = Field(10, ge=0, description="rows after which a reference point is read again; 0: never")
+    watch_limit_mm: float = Field(0.15, gt=0, description="change there, as lift-off, that means the part moved")
 
 
 class Analysis(Section):

@@ -1,23 +1,26 @@
-"""The scan step: align, check everything, then follow the plan and record."""
+"""The scan step: find the part, check everything, follow the plan and record; coarse, then corrected."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from eddyscan import __version__
-from eddyscan.core.frames import Array, checked_transform
+from eddyscan.core.mesh import SurfaceMesh
+from eddyscan.core.plan import ScanPlan
 from eddyscan.core.progress import Progress
+from eddyscan.core.technique import Technique
 from eddyscan.inspection import Inspection, read_json, sha256_of, write_json, write_step_note
+from eddyscan.pipeline.alignment import Placing, kept_placing, measured_placing, operators_placing
 from eddyscan.pipeline.control import ScanControl, WatchedSink
 from eddyscan.pipeline.states import inputs_of
 from eddyscan.pipeline.truth import keep_truth_log
 
 if TYPE_CHECKING:
-    from eddyscan.core.mesh import SurfaceMesh
     from eddyscan.devices.rig import Rig
+
+COARSE, FINE = "plan-coarse.json", "plan-fine.json"
 
 
 def scan_plan(
@@ -26,43 +29,25 @@ def scan_plan(
     """Follow 3-plan/plan.json into 4-record/record.sqlite; goes on where an earlier run stopped."""
     from eddyscan.formats.meshes import read_mesh
     from eddyscan.formats.plans import read_plan
-    from eddyscan.formats.records import SqliteRecord
-    from eddyscan.scanning import check, run
+    from eddyscan.scanning import check
 
-    technique = inspection.technique()
-    inputs = inputs_of(inspection, "record")
+    technique, inputs = inspection.technique(), inputs_of(inspection, "record")
     _set_stale_record_aside(inspection, inputs)
     plan = read_plan(inspection.file("plan", "plan.json"))
-    folder = inspection.step_folder("record")
-    if not dry_run:
-        folder.mkdir(exist_ok=True)
     mesh = read_mesh(inspection.file("surface", "surface.ply"))
-    T_stage_part = _alignment(inspection, rig, mesh, keep=not dry_run)
-    check(plan, rig.stage.axes(), T_stage_part, technique, mesh=mesh)
     if dry_run:
+        placing = kept_placing(inspection) or operators_placing(rig, mesh)
+        check(placing.plan(plan), rig.stage.axes(), placing.T_stage_part, technique, mesh=placing.mesh(mesh))
         return
+    started, folder = datetime.now(UTC), inspection.step_folder("record")
+    folder.mkdir(exist_ok=True)
     write_json(folder / "inputs.json", inputs)
-    started = datetime.now(UTC)
-    inspection.log("scan", stage=str(rig.stage.identity()), instrument=str(rig.instrument.identity()))
     control = control or ScanControl()
     control.attach(rig.stage)
-    sink = WatchedSink(SqliteRecord(folder / "record.sqlite"), control)
     try:
-        for key, value in _settings_as_applied(inspection, rig, T_stage_part, inputs).items():
-            sink.note(key, value)
-        run(
-            plan,
-            stage=rig.stage,
-            instrument=rig.instrument,
-            clock=rig.clock,
-            sink=sink,
-            technique=technique,
-            T_stage_part=T_stage_part,
-            mesh=mesh,
-            progress=progress,
-        )
+        placing = kept_placing(inspection) or measured_placing(inspection, rig, mesh, technique, progress)
+        _Passes(inspection, rig, technique, placing, control, progress).scan(plan, mesh)
     finally:
-        sink.close()
         if rig.cell is not None:
             keep_truth_log(inspection, rig.cell.truth_log())
     write_step_note(folder, inputs, started)
@@ -74,31 +59,103 @@ def _set_stale_record_aside(inspection: Inspection, inputs: dict[str, str]) -> N
         inspection.set_aside("record")
 
 
-def _alignment(inspection: Inspection, rig: Rig, mesh: SurfaceMesh, *, keep: bool) -> Array:
-    """Return T_stage_part: from an earlier start of this scan, rig.toml, or the operator's jog."""
-    path = inspection.file("record", "alignment.json")
-    if path.is_file():
-        return checked_transform(read_json(path)["T_stage_part"], str(path))
-    T_stage_part, how = rig.alignment(mesh)
-    if keep:
-        write_json(path, {"T_stage_part": np.asarray(T_stage_part).tolist(), "how": how})
-    return T_stage_part
+class _Passes:
+    """The passes of one record: one, or a coarse one and the fine one it corrects."""
+
+    def __init__(
+        self,
+        inspection: Inspection,
+        rig: Rig,
+        technique: Technique,
+        placing: Placing,
+        control: ScanControl,
+        progress: Progress,
+    ) -> None:
+        self._inspection, self._rig, self._technique = inspection, rig, technique
+        self._placing, self._control, self._progress = placing, control, progress
+
+    def scan(self, plan: ScanPlan, mesh: SurfaceMesh) -> None:
+        """Do every pass that the record does not hold in full."""
+        plan, mesh = self._placing.plan(plan), self._placing.mesh(mesh)
+        if self._technique.scan.passes == 1:
+            self._follow(plan, mesh, 0)
+            return
+        self._follow(self._coarse_plan(plan, mesh), mesh, 0)
+        self._follow(self._fine_plan(plan, mesh), mesh, 1)
+
+    def _follow(self, plan: ScanPlan, mesh: SurfaceMesh, number: int) -> None:
+        from eddyscan.formats.records import SqliteRecord
+        from eddyscan.scanning import run
+
+        rig = self._rig
+        sink = WatchedSink(SqliteRecord(self._file("record.sqlite"), scan_pass=number), self._control)
+        try:
+            if number == 1 and sink.done() >= _points(plan):
+                return
+            for key, value in self._settings_as_applied().items():
+                sink.note(key, value)
+            run(
+                plan,
+                stage=rig.stage,
+                instrument=rig.instrument,
+                clock=rig.clock,
+                sink=sink,
+                technique=self._technique,
+                T_stage_part=self._placing.T_stage_part,
+                mesh=mesh,
+                progress=self._progress,
+            )
+        finally:
+            sink.close()
+
+    def _coarse_plan(self, plan: ScanPlan, mesh: SurfaceMesh) -> ScanPlan:
+        """Return the plan of the coarse pass: rows `coarse_pitch_mm` apart, or the plan itself when it is as coarse."""
+        from eddyscan.planning import plan as make_plan
+
+        scan, wanted = self._technique.scan, self._technique.plan
+        if wanted.pitch_mm >= scan.coarse_pitch_mm:
+            return plan
+        wider = {"pitch_mm": scan.coarse_pitch_mm, "step_mm": max(wanted.step_mm, scan.coarse_pitch_mm)}
+        coarse = self._technique.model_copy(update={"plan": wanted.model_copy(update=wider)})
+        return self._kept(COARSE, lambda: make_plan(mesh, coarse, allow_gaps=True, progress=self._progress))
+
+    def _fine_plan(self, plan: ScanPlan, mesh: SurfaceMesh) -> ScanPlan:
+        """Return the plan moved to where the coarse pass found the metal."""
+        from eddyscan.analysis import analyse
+        from eddyscan.analysis.correction import corrected_plan
+        from eddyscan.formats.records import read_record
+
+        def corrected() -> ScanPlan:
+            record = read_record(self._file("record.sqlite"), scan_pass=0)
+            result = analyse(record, mesh, self._technique, progress=self._progress)
+            return corrected_plan(plan, record, result, self._technique, mesh=mesh)
+
+        return self._kept(FINE, corrected)
+
+    def _kept(self, name: str, make: Any) -> ScanPlan:
+        """Return the plan kept beside the record, made now if it is not there: a resumed scan follows the same one."""
+        from eddyscan.formats.plans import read_plan, write_plan
+
+        path = self._file(name)
+        if not path.is_file():
+            write_plan(make(), path)
+        return read_plan(path)
+
+    def _file(self, name: str) -> Path:
+        return self._inspection.file("record", name)
+
+    def _settings_as_applied(self) -> dict[str, Any]:
+        details = self._placing.details
+        calibration: dict[str, Any] = {key: details[key] for key in ("air", "coil") if key in details}
+        return {
+            "software": f"eddyscan {__version__}",
+            "technique": self._technique.model_dump(mode="json"),
+            "alignment": details,
+            "inputs": inputs_of(self._inspection, "record"),
+            "plan_sha256": sha256_of(self._inspection.file("plan", "plan.json")),
+        } | calibration
 
 
-def _settings_as_applied(
-    inspection: Inspection, rig: Rig, T_stage_part: Array, inputs: dict[str, str]
-) -> dict[str, Any]:
-    return {
-        "software": f"eddyscan {__version__}",
-        "technique": inspection.technique().model_dump(mode="json"),
-        "T_stage_part": T_stage_part.tolist(),
-        "inputs": inputs,
-        "plan_sha256": sha256_of(inspection.file("plan", "plan.json")),
-        "stage": _identity(rig.stage.identity()),
-        "instrument": _identity(rig.instrument.identity()),
-        "axes": [vars(axis) for axis in rig.stage.axes()],
-    }
-
-
-def _identity(identity: Any) -> dict[str, Any]:
-    return {key: getattr(identity, key) for key in ("kind", "model", "serial", "firmware", "verified", "settings")}
+def _points(plan: ScanPlan) -> set[tuple[int, int]]:
+    scanned = plan.is_scan
+    return set(zip(plan.row[scanned].tolist(), plan.point[scanned].tolist(), strict=True))

@@ -15,6 +15,7 @@ import numpy as np
 from eddyscan.core.errors import FileError, InputError
 from eddyscan.core.progress import Progress
 from eddyscan.inspection import Inspection, read_json, write_json
+from eddyscan.pipeline.alignment import kept_placing
 from eddyscan.pipeline.files import (
     comparison_json,
     nominal_of,
@@ -88,16 +89,21 @@ def make_plan(inspection: Inspection, rig_travel_mm: tuple[float, float, float] 
 def analyse_record(inspection: Inspection, progress: Progress) -> None:
     """Map 4-record on the surface into 5-cscan and call indications."""
     from eddyscan.analysis import analyse
-    from eddyscan.formats.meshes import read_mesh
+    from eddyscan.analysis.correction import corrected_surface, surface_correction
+    from eddyscan.formats.meshes import read_mesh, write_mesh
     from eddyscan.formats.record_ply import write_cscan_ply
     from eddyscan.formats.records import read_record
 
     started, inputs = datetime.now(UTC), inputs_of(inspection, "cscan")
+    technique, placing = inspection.technique(), kept_placing(inspection)
     mesh = read_mesh(inspection.file("surface", "surface.ply"))
+    mesh = mesh if placing is None else placing.mesh(mesh)
     record = read_record(inspection.file("record", "record.sqlite"))
-    result = analyse(record, mesh, inspection.technique(), progress=progress)
+    result = analyse(record, mesh, technique, progress=progress)
+    by_probe = corrected_surface(mesh, surface_correction(record, result, mesh, technique))
     with inspection.writing("cscan", inputs, started) as folder:
         write_cscan_ply(result.cscan, folder / "cscan.ply")
+        write_mesh(by_probe, folder / "surface-by-probe.ply")
         np.savez_compressed(folder / "readings.npz", lift_off_mm=result.lift_off_mm, residual_ohm=result.residual_ohm)
         write_json(folder / "indications.json", [asdict(indication) for indication in result.indications])
         write_json(folder / "summary.json", result.statistics)

@@ -17,6 +17,7 @@ from eddyscan.core.technique import Technique
 from eddyscan.inspection import Inspection, read_json, sha256_of
 from eddyscan.pipeline.files import nominal_of
 from eddyscan.pipeline.rigs import LazyRig
+from eddyscan.pipeline.scan import FINE
 from eddyscan.pipeline.states import OUTPUTS, inputs_of, states_of
 from eddyscan.pipeline.steps import step_summary
 from eddyscan.pipeline.truth import truth_of
@@ -128,8 +129,8 @@ def _views(inspection: Inspection) -> list[Any]:
 def _plan(inspection: Inspection) -> Any:
     from eddyscan.formats.plans import read_plan
 
-    path = inspection.file("plan", "plan.json")
-    return read_plan(path) if path.is_file() else None
+    paths = [inspection.file("record", FINE), inspection.file("plan", "plan.json")]
+    return next((read_plan(path) for path in paths if path.is_file()), None)
 
 
 def _nominal(inspection: Inspection, technique: Technique, mesh: SurfaceMesh) -> NominalComparison | None:
