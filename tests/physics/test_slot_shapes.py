@@ -96,7 +96,7 @@ def test_surface_terms_of_both_shapes_equal_a_plain_double_integral(thickness_mm
     line = np.pi * c * jv(1, uu * c) / (uu * c)
     lines = np.pi * c * s**3 * d * wt * jv(1, np.outer(uu * c, s)) / np.outer(uu * c, s)
     sums = np.zeros(2, dtype=complex)
-    for weight, profile in metal.terms(uu, vv):
+    for weight, profile in zip(metal.weights(uu, vv), metal.profiles(np.hypot(uu, vv)), strict=True):
         sums[0] += np.sum(area * weight * (line * rectangle.depth_transform(profile)[:, 0]) ** 2)
         sums[1] += np.sum(area * weight * np.sum(lines * profile.values(-d * np.cos(theta)), axis=1) ** 2)
     assert rectangle.surface_matrix(metal)[0, 0] == pytest.approx(sums[0] / np.pi**2, rel=1e-4)

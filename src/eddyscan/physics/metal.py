@@ -18,7 +18,8 @@ spectrum is (u^2 + w^2) K(s) / sigma with s^2 = u^2 + w^2 + g and
     K(s) = (a s - 1 + exp(-a s)) / (a^2 s^3)  ->  1/(2 s) for a -> 0
 
 after the delta term of the dyadic has cancelled the air-filled slot's own term
-1/(sigma a). What remains of G is of rank one in exponentials of z: `terms`.
+1/(sigma a). What remains of G is of rank one in exponentials of z: `profiles` and
+`weights`.
 """
 
 from __future__ import annotations
@@ -47,14 +48,6 @@ class DepthProfile:
         if self.down is not None:
             total = total + self.down[:, None] * np.exp(-np.outer(self.lam, z_m + self.thickness_m))
         return np.asarray(total)
-
-    def first(self) -> DepthProfile:
-        """Return the profile of the first wave number alone."""
-        down = None if self.down is None else self.down[:1]
-        return DepthProfile(self.lam[:1], self.up[:1], down, self.thickness_m)
-
-
-Term = tuple[ComplexArray, DepthProfile]
 
 
 @dataclass(frozen=True)
@@ -108,27 +101,36 @@ class SlottedMetal:
         own, under = self.sigma / lam, normal_admittance(self.below, kappa, self.frequency_hz)
         return (lam - admittance) / (lam + admittance), (own - under) / (own + under)
 
-    def terms(self, u: Array, v: Array) -> list[Term]:
-        """Return weights (K,) and depth profiles of the rank-one rest of G for wave numbers u, v (K,) [1/m]."""
+    def profiles(self, kappa: Array) -> list[DepthProfile]:
+        """Return the depth profiles of the rank-one rest of G at wave numbers kappa (K,) [1/m].
+
+        One for a half-space; for a layer two more, transverse electric and magnetic,
+        for what its lower face sends back.
+        """
+        lam = layer_lambda(self.layer, kappa, self.frequency_hz)
+        one = np.ones_like(lam)
+        found = [DepthProfile(lam, one, None, 0.0)]
+        if self.layer.thickness_m is not None:
+            once = np.exp(-lam * self.layer.thickness_m)
+            for top in ((lam - kappa) / (lam + kappa), one):
+                found.append(DepthProfile(lam, top * once, one, self.layer.thickness_m))
+        return found
+
+    def weights(self, u: Array, v: Array) -> list[ComplexArray]:
+        """Return the weight of each profile at wave numbers u, v (K,) [1/m]."""
         kappa = np.hypot(u, v)
         lam = layer_lambda(self.layer, kappa, self.frequency_hz)
         width = np.sinc(0.5 * v * self.opening_m / np.pi) ** 2
         electric = self.j_omega_mu * width * u**2 / kappa**2
-        found: list[Term] = [
-            (electric * kappa / (lam * (lam + kappa)), DepthProfile(lam, np.ones_like(lam), None, 0.0))
-        ]
+        found: list[ComplexArray] = [electric * kappa / (lam * (lam + kappa))]
         faces = self.lower_face(kappa)
         if faces is None or self.layer.thickness_m is None:
             return found
-        t = self.layer.thickness_m
+        twice = np.exp(-2 * lam * self.layer.thickness_m)
         magnetic = width * v**2 * lam**2 / (kappa**2 * self.sigma)
-        for weight, top, bottom in (
-            (electric, (lam - kappa) / (lam + kappa), faces[0]),
-            (magnetic, np.ones_like(lam), faces[1]),
-        ):
-            round_trip = 1 - top * bottom * np.exp(-2 * lam * t)
-            profile = DepthProfile(lam, top * np.exp(-lam * t), np.ones_like(lam), t)
-            found.append((-weight * bottom / (round_trip * 2 * lam), profile))
+        tops = ((lam - kappa) / (lam + kappa), np.ones_like(lam))
+        for weight, top, bottom in zip((electric, magnetic), tops, faces, strict=True):
+            found.append(-weight * bottom / ((1 - top * bottom * twice) * 2 * lam))
         return found
 
     def coil_profile(self, k: Array) -> DepthProfile:

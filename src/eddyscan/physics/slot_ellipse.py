@@ -103,8 +103,8 @@ class EllipseBasis:
             phi, wphi = _directions(one * c)
             u, v = one * np.sin(phi), one * np.cos(phi)
             phase = np.outer(x, u)
-            for strength, profile in metal.terms(u, v):
-                depth = profile.first().values(z.ravel())[0].reshape(z.shape)
+            for strength, profile in zip(metal.weights(u, v), metal.profiles(np.array([one])), strict=True):
+                depth = profile.values(z.ravel())[0].reshape(z.shape)
                 columns = np.einsum("bij,ij->bi", weighted, depth)
                 lines = np.where(odd[:, None], columns @ np.sin(phase), columns @ np.cos(phase))
                 total += (lines * (strength * share * one * wphi)) @ lines.T

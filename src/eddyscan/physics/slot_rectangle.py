@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from eddyscan.core.frames import Array, ComplexArray, IntArray
 from eddyscan.physics.bessel_rules import ProductRule, product_rule
@@ -19,6 +20,7 @@ from eddyscan.physics.quadrature import gauss_panels
 from eddyscan.physics.slot_basis import chebyshev_nodes, fejer_weights
 
 LINE_DEPTHS = 8
+KAPPA_NODES = 600
 
 
 @dataclass(frozen=True)
@@ -56,14 +58,23 @@ class RectangleBasis:
         lowest = self._scales(metal)[0]
         edges = lowest * 3.0 ** np.arange(np.log(1e3 / shortest / lowest) / np.log(3))
         v, wv = gauss_panels(np.concatenate([[0.0], edges]), 7)
-        total = np.zeros((len(px), len(z_pairs)), dtype=np.complex128)
-        for start in range(0, len(u), 64):
-            rows = slice(start, start + 64)
-            for weight, profile in metal.terms(np.repeat(u[rows], len(v)), np.tile(v, len(u[rows]))):
-                depth = self.depth_transform(profile)
-                pair = depth[:, z_pairs[:, 0]] * depth[:, z_pairs[:, 1]] * weight[:, None]
-                total += px[:, rows] @ np.einsum("v,uvp->up", wv, pair.reshape(-1, len(v), len(z_pairs)))
+        folded = self._depth_products(metal, u, v, wv)
+        total = px @ folded[:, z_pairs[:, 0], z_pairs[:, 1]]
         return self._assemble(total / np.pi**2, x_rule.pairs, z_pairs)
+
+    def _depth_products(self, metal: SlottedMetal, u: Array, v: Array, wv: Array) -> ComplexArray:
+        """Return the integral over v of products of depth transforms, summed over profiles (U, down, down).
+
+        Transforms depend on kappa alone: they are computed on a fine logarithmic grid and splined.
+        """
+        uu, vv = np.meshgrid(u, v, indexing="ij")
+        kappa = np.hypot(uu, vv)
+        nodes = np.geomspace(kappa.min() * (1 - 1e-9), kappa.max() * (1 + 1e-9), KAPPA_NODES)
+        total = np.zeros((len(u), self.down, self.down), dtype=np.complex128)
+        for weight, profile in zip(metal.weights(uu, vv), metal.profiles(nodes), strict=True):
+            depth = CubicSpline(np.log(nodes), self.depth_transform(profile))(np.log(kappa))
+            total += np.matmul((depth * (weight * wv)[..., None]).transpose(0, 2, 1), depth)
+        return total
 
     def _scales(self, metal: SlottedMetal) -> tuple[float, float]:
         """Return the smallest and largest wave numbers [1/m] that matter."""
