@@ -11,26 +11,21 @@ from eddyscan.core.plan import Coverage, ScanPlan, Uncovered
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.technique import Technique
 from eddyscan.planning.assembly import assembled, plan_of, route_through
+from eddyscan.planning.condition import CRUMB_OF_PART, conditioned
 from eddyscan.planning.heights import height_map
 from eddyscan.planning.order import boustrophedon
 from eddyscan.planning.patch_rows import PlannedPatch, planned_patch
+from eddyscan.planning.patches import Patch, patches_of
 from eddyscan.planning.probe_pose import Stance, normal_stance, vertical_stance
-from eddyscan.planning.region import (
-    Patch,
-    border_distance,
-    faces_seen_from_above,
-    patches_of,
-    steepest_tilt_deg,
-    travel_guard,
-)
+from eddyscan.planning.region import border_distance, faces_seen_from_above, steepest_tilt_deg, travel_guard
 from eddyscan.planning.region_guard import Guard, combined, left_out, merged, tilt_guard
 from eddyscan.planning.route import AroundLinks, LevelLinks
 from eddyscan.planning.smooth import SmoothSurface, smoothed
 from eddyscan.planning.strokes import Stroke
 from eddyscan.planning.timing import MotionLimits
+from eddyscan.planning.topology import edges_of
 from eddyscan.planning.verify import row_distances, spacings
 
-CRUMB_OF_PART = 0.002
 # Faces a little steeper than the limit stay, so that rows end at the slope itself, not at a ragged edge of faces.
 STEEP_BAND_DEG = 4.5
 
@@ -71,11 +66,18 @@ def plan(
     CoverageError
         When less than `technique.plan.coverage_min` of the region is swept.
     """
+    fit = conditioned(mesh, technique.plan)
+    mesh = SurfaceMesh.from_triangles(fit.vertices, fit.faces)
     patches, zones = _patches(mesh, technique)
+    if fit.crumbs_mm2:
+        zones.append(Uncovered("loose pieces", fit.crumbs_mm2))
     planned: list[PlannedPatch] = []
-    for k, patch in enumerate(patches):
+    for k, whole in enumerate(patches):
         progress("planning rows", k, len(patches))
-        surface = smoothed(patch.vertices, patch.faces, technique.plan.pitch_mm)
+        patch, split = whole.refined(max(1.5, 0.3 * technique.plan.pitch_mm))
+        if split:
+            fit.notes.append(f"{split} long edges split so that rows can bend between vertices")
+        surface = smoothed(patch.vertices, patch.faces, technique.plan.pitch_mm, spacing_mm=fit.spacing_mm)
         guards = _guards(patch, surface, mesh, technique, travel_mm)
         done = planned_patch(surface, technique, combined(guards, len(surface.vertices)))
         if done is not None:
@@ -93,7 +95,7 @@ def plan(
     points, normals = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("points", "normals"))
     stance, links = _stance(mesh, points, normals, technique)
     arrays = assembled(strokes, stance, route_through(strokes, stance, links), technique, motion or MotionLimits())
-    return plan_of(arrays, coverage, technique, inputs=inputs or {})
+    return plan_of(arrays, coverage, technique, inputs=inputs or {}, notes=tuple(fit.notes))
 
 
 def _patches(mesh: SurfaceMesh, technique: Technique) -> tuple[list[Patch], list[Uncovered]]:
@@ -105,7 +107,21 @@ def _patches(mesh: SurfaceMesh, technique: Technique) -> tuple[list[Patch], list
         seen = faces_seen_from_above(mesh.vertices, mesh.faces, tilt + STEEP_BAND_DEG)
         if (~seen).any():
             zones.append(Uncovered(_steep(tilt), float(area[~seen].sum())))
-    return patches_of(mesh.vertices, mesh.faces[seen], least_mm2=CRUMB_OF_PART * float(area.sum())), zones
+    elif not edges_of(mesh.faces).count.min() < 2:
+        # A closed part in the part frame stands on the table with its flat bottom.
+        down = face_vectors(mesh.vertices, mesh.faces)[:, 2] < -1.9 * area
+        low = mesh.vertices[mesh.faces, 2].max(axis=1) < mesh.vertices[:, 2].min() + 0.5
+        seen = ~(down & low)
+        if (~seen).any():
+            zones.append(Uncovered("stands on the table", float(area[~seen].sum())))
+    least = CRUMB_OF_PART * float(area.sum())
+    patches = patches_of(mesh.vertices, mesh.faces, seen, least_mm2=least)
+    if not patches:
+        raise GeometryError(
+            f"no piece of the surface can be scanned: of {area.sum():.0f} mm^2, {area[seen].sum():.0f} mm^2 face the "
+            f"probe, none of it a connected piece over {least:.1f} mm^2. Check the mesh, or use another machine."
+        )
+    return patches, zones
 
 
 def _steepest(technique: Technique) -> float:

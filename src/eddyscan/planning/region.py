@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -11,27 +9,10 @@ from eddyscan.core.errors import GeometryError
 from eddyscan.core.frames import Array, BoolArray, IntArray
 from eddyscan.core.mesh import face_vectors
 from eddyscan.core.technique import Probe
-from eddyscan.planning.topology import border_edges, compacted, face_pieces
+from eddyscan.planning.patches import Patch
+from eddyscan.planning.topology import border_edges
 
 TRAVEL_RESERVE_MM = 0.5
-
-
-@dataclass(frozen=True)
-class Patch:
-    """One connected piece to scan.
-
-    Attributes
-    ----------
-    vertices : (V, 3) [mm, part], faces : (F, 3)
-    """
-
-    vertices: Array
-    faces: IntArray
-
-    @property
-    def area_mm2(self) -> float:
-        """Return the area [mm^2]."""
-        return float(0.5 * np.linalg.norm(face_vectors(self.vertices, self.faces), axis=1).sum())
 
 
 def steepest_tilt_deg(probe: Probe, lift_off_max_mm: float) -> float:
@@ -49,15 +30,6 @@ def faces_seen_from_above(vertices: Array, faces: IntArray, tilt_deg: float) -> 
     flat = face_vectors(vertices, faces)
     length = np.linalg.norm(flat, axis=1)
     return np.asarray(flat[:, 2] > np.cos(np.radians(tilt_deg)) * np.maximum(length, 1e-300))
-
-
-def patches_of(vertices: Array, faces: IntArray, *, least_mm2: float) -> list[Patch]:
-    """Return the connected pieces of at least `least_mm2`, largest first."""
-    if len(faces) == 0:
-        return []
-    n, label = face_pieces(faces)
-    pieces = [Patch(*compacted(vertices, faces[label == k])[:2]) for k in range(n)]
-    return sorted((p for p in pieces if p.area_mm2 >= least_mm2), key=lambda p: -p.area_mm2)
 
 
 def border_distance(patch: Patch) -> Array:

@@ -89,7 +89,7 @@ class SmoothSurface:
         return np.asarray(np.maximum(np.abs(half + spread), np.abs(half - spread)))
 
 
-def smoothed(vertices: Array, faces: IntArray, footprint_mm: float) -> SmoothSurface:
+def smoothed(vertices: Array, faces: IntArray, footprint_mm: float, *, spacing_mm: float = 0.0) -> SmoothSurface:
     """Fit the smooth surface of a mesh.
 
     Parameters
@@ -99,10 +99,14 @@ def smoothed(vertices: Array, faces: IntArray, footprint_mm: float) -> SmoothSur
         Width the probe sees: the least diameter of the fits. It grows with the
         mesh's noise until normals are good to about 0.4 degrees, and again near
         borders, where neighbours are on one side only.
+    spacing_mm : float
+        Distance of the vertices that were measured or drawn, when others were
+        added between them: fits span several.
     """
     area = 0.5 * np.linalg.norm(face_vectors(vertices, faces), axis=1).sum()
     density = len(vertices) / max(area, 1e-12)
-    least = max(min(footprint_mm, WIDEST_MM) / 2, 2.4 / np.sqrt(density))
+    narrow = min(footprint_mm, WIDEST_MM) / 2
+    least = max(narrow, 2.4 / np.sqrt(density), min(2.4 * spacing_mm, 1.5 * narrow))
     cloud = _Cloud(vertices, vertex_normals(vertices, faces), KDTree(vertices), density)
     sample = np.linspace(0, len(vertices) - 1, min(len(vertices), 600)).astype(np.int64)
     noise_mm = float(np.median(_fit(cloud, sample, least)[4]))

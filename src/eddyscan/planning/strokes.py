@@ -13,6 +13,8 @@ from eddyscan.planning.smooth import SmoothSurface
 
 TRIM_OF_STEP = 0.05
 SPACING_OF_STEP = 0.008
+# Pieces shorter than this are read once, in their middle.
+ONE_POINT_OF_STEP = 0.5
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ def _lifted(line: Line, surface: SmoothSurface) -> Array:
 def _stations(length: float, step: float, *, closed: bool) -> Array:
     if closed:
         return np.linspace(0.0, length, steps_in_loop(length, step) + 1)
+    if length < ONE_POINT_OF_STEP * step:
+        return np.array([length / 2])
     n = max(1, round(length / step))
     over = length - n * step * (1 + SPACING_OF_STEP)
     trim = float(np.clip(over / 2, 0.0, TRIM_OF_STEP * step))

@@ -94,6 +94,8 @@ def densified(stroke: Stroke, fine_mm: float) -> tuple[Array, Array, Array]:
     leaves and arrives in the tangent planes (Hermite).
     """
     p, n = stroke.points, stroke.normals
+    if len(p) == 1:
+        return p, n, np.zeros_like(p)
     chord = np.diff(p, axis=0)
     length = np.maximum(surface_distance(p[:-1], p[1:], n[:-1], n[1:]), 1e-12)
     m = max(1, int(np.ceil(float(length.max()) / fine_mm)))
