@@ -110,7 +110,7 @@ class Drive(Section):
 class Plan(Section):
     """Rows and points on the surface."""
 
-    strategy: Strategy = "adaptive"
+    strategy: Strategy = "geodesic"
     machine: Machine = "xyz"
     pitch_mm: float = Field(5.0, gt=0, description="row distance on the surface")
     step_mm: float = Field(5.0, gt=0, description="point distance along a row, on the surface")
