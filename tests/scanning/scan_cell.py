@@ -109,8 +109,9 @@ class MemorySink:
 
 
 def technique(**scan) -> Technique:
+    """Return a technique with these [scan] values; without a watch on the part unless asked for."""
     base = Technique()
-    return base.model_copy(update={"scan": base.scan.model_copy(update=scan)})
+    return base.model_copy(update={"scan": base.scan.model_copy(update={"watch_rows": 0, **scan})})
 
 
 @dataclass

@@ -203,7 +203,9 @@ def test_the_probe_goes_up_first_and_down_last(step_cell):
     moves.clear()
     plan = wavy_plan(rows=1)
     go(step_cell, plan)
-    (a, b, _), (c, d, _), (e, f, slow) = moves[:3]
+    (a, b, _), (c, d, _), *down = moves[:4]
+    (e, f, slow) = down[-1]
+    assert e[2] > f[2]
     assert b[2] > a[2]
     assert b[:2] == pytest.approx(a[:2], abs=1e-4)
     assert c[2] == pytest.approx(d[2], abs=1e-4)

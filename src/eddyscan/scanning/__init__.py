@@ -4,8 +4,19 @@ This room alone holds a plan and a device at the same time; it sees the
 protocols, never a driver or a simulator.
 """
 
+from eddyscan.scanning.alignment import TouchAlignment, align_from_corner, align_from_points
 from eddyscan.scanning.checking import check
+from eddyscan.scanning.jog import JogSession, JogState
 from eddyscan.scanning.keep_out import KeepOut
 from eddyscan.scanning.running import run
 
-__all__ = ["KeepOut", "check", "run"]
+__all__ = [
+    "JogSession",
+    "JogState",
+    "KeepOut",
+    "TouchAlignment",
+    "align_from_corner",
+    "align_from_points",
+    "check",
+    "run",
+]

@@ -12,8 +12,9 @@ from eddyscan.core.errors import TechniqueError
 from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.record import POSITION_DOUBTFUL, Reading
 from eddyscan.devices.protocols import ImpedanceReading, PathSample, PathStage, Stage
+from eddyscan.scanning.hops import hop
 from eddyscan.scanning.latency import Latency, measure_latency
-from eddyscan.scanning.stepping import approach_leg, hop, legs, read_point
+from eddyscan.scanning.stepping import approach_leg, legs, read_point, watch_part
 from eddyscan.scanning.trajectory import RowPath, row_path
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def scan_in_rows(scan: Scan, mode: str) -> None:
     has_reading = [(int(r), int(p)) in done for r, p in zip(plan.row, plan.point, strict=True)]
     latency: Latency | None = None
     for leg, run in strokes(legs(plan.kind, has_reading), plan.row):
+        watch_part(scan, int(plan.row[run[0]]))
         approach_leg(scan, leg, run[0])
         last, stuck = run[-1], False
         if latency is None:
@@ -54,6 +56,7 @@ def scan_in_rows(scan: Scan, mode: str) -> None:
             if run:
                 hop(scan, scan.targets[run[0]])
         scan.at = last
+    watch_part(scan, None)
 
 
 def strokes(legs_to_go: list[list[int]], row: Sequence[int] | IntArray) -> list[tuple[list[int], list[int]]]:

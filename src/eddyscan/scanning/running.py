@@ -14,6 +14,7 @@ from eddyscan.core.technique import Technique
 from eddyscan.devices.protocols import Clock, EddyInstrument, RecordSink, Stage
 from eddyscan.scanning.checking import check
 from eddyscan.scanning.keep_out import KeepOut
+from eddyscan.scanning.part_watch import PartWatch
 from eddyscan.scanning.rows import scan_in_rows
 from eddyscan.scanning.signals import ended_by_signals
 from eddyscan.scanning.stepping import scan_in_steps
@@ -26,7 +27,7 @@ class Scan:
 
     `targets` are the axis readings (N, 3) [mm, stage] of the plan's poses,
     `height_mm` the z reading at which the probe crosses over the part, `at` the
-    pose where the probe stands (None: elsewhere).
+    pose where the probe stands (None: elsewhere), `row` the row under way.
     """
 
     plan: ScanPlan
@@ -40,6 +41,9 @@ class Scan:
     began_s: float
     progress: Progress = silent
     at: int | None = None
+    row: int | None = None
+    watch: PartWatch | None = None
+    rows_since_watch: int = 0
 
 
 def run(

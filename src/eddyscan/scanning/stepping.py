@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eddyscan.core.frames import Array, IntArray
+from eddyscan.core.frames import IntArray
 from eddyscan.core.plan import SCAN
 from eddyscan.core.record import POSITION_DOUBTFUL, Reading
-from eddyscan.scanning.targets import with_z
+from eddyscan.scanning.hops import hop
+from eddyscan.scanning.part_watch import PartWatch
 
 if TYPE_CHECKING:
     from eddyscan.scanning.running import Scan
@@ -21,16 +22,34 @@ def scan_in_steps(scan: Scan) -> None:
     plan = scan.plan
     has_reading = [(int(r), int(p)) in done for r, p in zip(plan.row, plan.point, strict=True)]
     for count, leg in enumerate(legs(plan.kind, has_reading), len(done) + 1):
+        watch_part(scan, int(plan.row[leg[-1]]))
         approach_leg(scan, leg[:-1], leg[-1])
         read_point(scan, leg[-1])
         scan.progress("scan", count, plan.n_scan)
+    watch_part(scan, None)
+
+
+def watch_part(scan: Scan, row: int | None) -> None:
+    """Before a row (None: after the last): read the reference point again when a block of rows is over."""
+    every = scan.technique.scan.watch_rows
+    if every == 0 or (row is not None and row == scan.row):
+        return
+    if scan.watch is None:
+        if row is None:
+            return
+        scan.watch = PartWatch(scan)
+    elif row is None or scan.rows_since_watch >= every:
+        scan.watch.look()
+        scan.rows_since_watch = 0
+    scan.rows_since_watch += 1
+    scan.row = row
 
 
 def approach_leg(scan: Scan, leading: list[int], index: int) -> None:
     """Go to a pose through the poses that lead to it; from anywhere else up, across and down."""
     for each in (*leading, index):
         if scan.at is None or each != scan.at + 1:
-            hop(scan, scan.targets[each])
+            hop(scan, scan.targets[each], slowly=bool(scan.plan.is_scan[each]))
         else:
             scan.stage.move(scan.targets[each], float(scan.plan.speed_mm_s[each]) or None)
         scan.at = each
@@ -53,18 +72,6 @@ def legs(kind: IntArray, has_reading: list[bool]) -> list[list[int]]:
             out.append([*leading, index])
             leading = []
     return out
-
-
-def hop(scan: Scan, target: Array) -> None:
-    """Go to a pose from anywhere: up, across, and down last and slowly."""
-    here = scan.stage.position()
-    height = max(scan.height_mm, float(target[2]))
-    if here[2] < height:
-        scan.stage.move(with_z(here, height))
-        here = with_z(here, height)
-    above = with_z(target, max(height, float(here[2])))
-    scan.stage.move(above)
-    scan.stage.move(target, scan.technique.scan.approach_speed_mm_s)
 
 
 def read_point(scan: Scan, index: int) -> None:
