@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eddyscan.core.errors import FileError, InputError
@@ -101,6 +101,7 @@ def test_rows_are_cut_at_gaps_and_turns() -> None:
     assert point[:3].tolist() == [0, 1, 2]
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)), min_size=1, max_size=60))
 def test_rows_number_every_reading_once(path: list[tuple[float, float]]) -> None:
     row, point = rows_along(np.array(path))

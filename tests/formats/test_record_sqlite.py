@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eddyscan.core.errors import EddyscanError, FileError, WorkError
@@ -56,6 +56,7 @@ def test_is_set_to_wal_and_full(tmp_path: Path) -> None:
         assert record._db.execute("PRAGMA synchronous").fetchone()[0] == 2
 
 
+@settings(deadline=None, max_examples=40)
 @given(
     st.lists(
         st.tuples(
@@ -158,6 +159,24 @@ def test_closing_twice_is_fine_and_leaves_one_file(tmp_path: Path) -> None:
     sink.close()
     sink.close()
     assert [p.name for p in tmp_path.iterdir()] == ["r.sqlite"]
+
+
+def test_reading_a_finished_record_leaves_nothing_beside_it(tmp_path: Path) -> None:
+    path = a_record(tmp_path / "r.sqlite")
+    before = path.read_bytes()
+    read_record(path)
+    record_passes(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["r.sqlite"]
+    assert path.read_bytes() == before
+
+
+def test_a_record_in_a_folder_without_write_permission_is_read(tmp_path: Path) -> None:
+    path = a_record(tmp_path / "r.sqlite")
+    tmp_path.chmod(0o555)
+    try:
+        assert len(read_record(path)) == 3
+    finally:
+        tmp_path.chmod(0o755)
 
 
 def test_can_be_read_while_it_grows(tmp_path: Path) -> None:

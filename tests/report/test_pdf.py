@@ -7,7 +7,7 @@ import zlib
 
 import pytest
 from example_inspection import small_inspection
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eddyscan.core.technique import Technique
@@ -81,6 +81,7 @@ def test_a_new_sheet_opens_only_when_needed() -> None:
     assert len(paper.sheets) == 2
 
 
+@settings(deadline=None)
 @given(st.text(st.characters(min_codepoint=33, max_codepoint=126) | st.just(" "), max_size=80), st.floats(20, 300))
 def test_wrapped_lines_fit_and_lose_nothing(text: str, room_pt: float) -> None:
     lines = wrapped(text, room_pt, 9.0)

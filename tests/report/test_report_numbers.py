@@ -17,7 +17,7 @@ from example_inspection import (
     small_inspection,
     whole_inspection,
 )
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.image import imread
 
@@ -45,6 +45,7 @@ def decoded(array: dict[str, str]) -> np.ndarray:
     return np.frombuffer(base64.b64decode(array["bdata"]), dtype="<" + array["dtype"])
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(*[st.floats(-0.1, 0.1)] * 3), min_size=1, max_size=40))
 def test_position_errors_are_mean_and_standard_deviation_per_axis(errors_mm: list[tuple[float, float, float]]) -> None:
     record, _, _ = example_record(example_plan(30.0, 30.0))
@@ -97,6 +98,7 @@ def test_half_a_covered_plate_is_half_examined() -> None:
     assert examined_share(CScan(plate, plate.vertices[:, 0] < 100.0)) == pytest.approx(0.5, abs=0.005)
 
 
+@settings(deadline=None)
 @given(st.floats(0, 1))
 def test_examined_and_not_examined_add_up_and_never_flatter(share: float) -> None:
     examined, rest = (float(text.removesuffix(" %")) for text in share_texts(share))
@@ -105,6 +107,7 @@ def test_examined_and_not_examined_add_up_and_never_flatter(share: float) -> Non
     assert (percent(share) == "100.0 %") == (share == 1.0)
 
 
+@settings(deadline=None)
 @given(st.integers(20, 400))
 def test_a_thinned_mesh_keeps_vertices_and_form(most: int) -> None:
     mesh = named_part("block-a").top_mesh(4.0)
@@ -175,6 +178,7 @@ def test_a_cloud_has_a_picture_too() -> None:
     assert imread(io.BytesIO(picture.png)).shape[2] == 4
 
 
+@settings(deadline=None)
 @given(st.floats(0.1, 6.2), st.floats(0.5, 50.0))
 def test_growing_lift_off_is_turned_to_the_left(direction_rad: float, slope: float) -> None:
     lift: Array = np.linspace(0.3, 0.8, 50)
@@ -255,6 +259,7 @@ def test_numbers_read_well(value: float | None, text: str) -> None:
     assert number(value) == text
 
 
+@settings(deadline=None)
 @given(st.floats(1e-4, 1e5))
 def test_numbers_keep_four_digits(value: float) -> None:
     assert float(number(value)) == pytest.approx(value, rel=1e-3)

@@ -33,7 +33,9 @@ def _open(path: Path) -> sqlite3.Connection:
         raise FileError(f"there is no record {path}. Scan first, or check the path.")
     if path.stat().st_size == 0 and not path.with_name(path.name + "-wal").exists():
         raise FileError(f"{path} is empty (0 bytes), so it holds no scan. Scan again, or restore it from a copy.")
-    db = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, isolation_level=None)
+    # Without a log nobody writes: opened as immutable, SQLite leaves no files of its own beside a finished record.
+    finished = "" if path.with_name(path.name + "-wal").exists() else "&immutable=1"
+    db = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro{finished}", uri=True, isolation_level=None)
     try:
         with explained(path):
             if is_blank(db):
