@@ -13,7 +13,7 @@ from eddyscan.core.technique import Technique
 from eddyscan.planning.assembly import assembled, plan_of, route_through
 from eddyscan.planning.condition import CRUMB_OF_PART, conditioned
 from eddyscan.planning.heights import height_map
-from eddyscan.planning.order import boustrophedon
+from eddyscan.planning.order import ordered
 from eddyscan.planning.patch_rows import PlannedPatch, planned_patch
 from eddyscan.planning.patches import Patch, patches_of
 from eddyscan.planning.probe_pose import Stance, normal_stance, vertical_stance
@@ -79,16 +79,18 @@ def plan(
             fit.notes.append(f"{split} long edges split so that rows can bend between vertices")
         surface = smoothed(patch.vertices, patch.faces, technique.plan.pitch_mm, spacing_mm=fit.spacing_mm)
         guards = _guards(patch, surface, mesh, technique, travel_mm)
-        done = planned_patch(surface, technique, combined(guards, len(surface.vertices)))
-        if done is not None:
-            planned.append(done)
-            zones += left_out(guards, done.samples, surface)
+        laid = planned_patch(surface, technique, combined(guards, len(surface.vertices)))
+        if laid is not None:
+            planned.append(laid)
+            zones += left_out(guards, laid.samples, surface)
         else:
             zones.append(Uncovered("inside the margin or out of reach altogether", patch.area_mm2))
     progress("planning rows", len(patches), len(patches))
     if not planned:
         raise _nothing_left(mesh, technique)
-    strokes = [stroke for patch in planned for stroke in boustrophedon(patch.strokes)]
+    strokes: list[Stroke] = []
+    for done in planned:
+        strokes += ordered(done.strokes, strokes[-1].points[-1] if strokes else None)
     coverage = _coverage(planned, strokes, technique, zones)
     if not allow_gaps:
         _require(coverage, technique)

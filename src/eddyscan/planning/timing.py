@@ -20,8 +20,8 @@ class MotionLimits:
     command_s : float, link and controller time per commanded move
     """
 
-    speed_mm_s: tuple[float, float, float] = (29.0, 29.0, 14.0)
-    acceleration_mm_s2: tuple[float, float, float] = (100.0, 100.0, 60.0)
+    speed_mm_s: tuple[float, float, float] = (29.0, 29.0, 24.0)
+    acceleration_mm_s2: tuple[float, float, float] = (200.0, 200.0, 200.0)
     reading_s: float = 0.02
     command_s: float = 0.02
 
