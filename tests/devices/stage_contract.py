@@ -65,18 +65,13 @@ class StageContract:
         homed.move(here)
         assert homed.position() == pytest.approx(here, abs=self.tolerance)
 
-    def test_a_lower_speed_takes_longer(self, homed, clock):
+    def test_a_move_is_no_faster_than_it_was_told(self, homed, clock):
         start = self.middle(homed)
         homed.move(start)
-        taken = []
-        for speed, step in ((2.0, 4.0), (20.0, -4.0)):
-            before = clock.now()
-            target = homed.position()
-            target[0] += step
-            homed.move(target, speed)
-            taken.append(clock.now() - before)
-        assert taken[0] > 2.0
-        assert taken[0] > 1.5 * taken[1]
+        before = clock.now()
+        start[0] += 4.0
+        homed.move(start, 2.0)
+        assert clock.now() - before > 4.0 / 2.0
 
     @pytest.mark.parametrize("beyond", ["lower", "upper"])
     def test_a_target_outside_the_travel_is_refused_before_anything_moves(self, homed, beyond):

@@ -41,7 +41,7 @@ class AxisState:
         self.busy = False
         self.direction = 1.0
         self._rng = rng
-        self._waves = _error_waves(model.accuracy, rng)
+        self._waves = error_waves(model.accuracy, rng)
 
     # -- where it is -------------------------------------------------------
 
@@ -181,7 +181,7 @@ class AxisState:
         self._motion, self._began, self._path, self.busy = motion, now, None, True
 
 
-def _error_waves(accuracy: float, rng: np.random.Generator) -> list[tuple[int, float, float]]:
+def error_waves(accuracy: float, rng: np.random.Generator) -> list[tuple[int, float, float]]:
     """Return (waves over the travel, size, phase) of a smooth error whose peak-to-peak is `accuracy`."""
     waves = [(k, 1.0 / k, float(rng.uniform(0, 2 * np.pi))) for k in (1, 2, 3, 5)]
     grid = np.linspace(0, 2 * np.pi, 721)
