@@ -70,6 +70,7 @@ class Hand:
     def __init__(self, driver: Any, address: str) -> None:
         self.driver = driver
         self.address = address
+        self.refusals_expected = False
 
     def open(self, place: str = "") -> None:
         self.driver.get("about:blank")
@@ -119,11 +120,11 @@ class Hand:
         chain.release().perform()
 
     def wait(self, good: Callable[[], Any], seconds: float = 20.0, what: str = "") -> Any:
-        from selenium.common.exceptions import StaleElementReferenceException
+        from selenium.common.exceptions import JavascriptException, StaleElementReferenceException
 
         until = time.monotonic() + seconds
         while time.monotonic() < until:
-            with contextlib.suppress(StaleElementReferenceException):
+            with contextlib.suppress(StaleElementReferenceException, JavascriptException):
                 if value := good():
                     return value
             time.sleep(0.05)
@@ -169,6 +170,7 @@ class Hand:
 
     def complaints(self) -> list[str]:
         """Return what the browser's console complained about, drawing speed aside."""
-        quiet = ("GPU stall", "GL Driver Message", "software WebGL")
+        quiet = ["GPU stall", "GL Driver Message", "software WebGL"]
+        quiet += ["status of 400", "status of 409"] if self.refusals_expected else []
         said = [str(entry["message"]) for entry in self.driver.get_log("browser")]
         return [line for line in said if not any(word in line for word in quiet)]

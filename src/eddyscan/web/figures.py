@@ -106,7 +106,7 @@ def _views(inspection: Inspection, _: dict[str, dict[str, Any]]) -> str:
 
 def _surface(_: Inspection, summaries: dict[str, dict[str, Any]]) -> str:
     summary = summaries["surface"]
-    size = " × ".join(f"{value:.0f}" for value in summary["size_mm"])
+    size = " × ".join(f"{value:.0f}" for value in summary["size_mm"][:2])
     rmse = [view["inlier_rmse_mm"] for view in summary["views"] if view["inlier_rmse_mm"] is not None]
     fit = f", views agree to {max(rmse):.3f} mm" if rmse else ""
     return f"{size} mm{fit}"

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from eddyscan.core.errors import EddyscanError
 from eddyscan.core.record import Reading
 from eddyscan.web.link import Link
 from eddyscan.web.placing import Placing
@@ -82,7 +81,7 @@ class Outbox:
             return
         try:
             rows = self._placing.rows(readings)
-        except (EddyscanError, KeyError, OSError) as error:
+        except Exception as error:  # showing must not end the sending, whatever is wrong with it
             self._placing = None
             self._link.send({"event": "note", "message": f"readings are recorded but cannot be shown live: {error}"})
             return

@@ -11,6 +11,7 @@ import numpy as np
 from eddyscan.core.errors import EddyscanError
 from eddyscan.core.frames import Array, ComplexArray, IntArray, apply, checked_transform, invert
 from eddyscan.core.record import Reading, ScanRecord
+from eddyscan.core.technique import Technique
 from eddyscan.inspection import Inspection, read_json
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ DECIMALS = (0, 0, 3, 3, 3, 3, 9, 9, 0, 4)
 class Placing:
     """Places readings of one folder's scan in the part frame and tells the coil's lift-off.
 
-    The lift-off is the analysis's curve of sound metal at the planned tilt; the
+    The lift-off is read off the curve of sound metal at the planned tilt; the
     corrections that need the whole scan (curvature, drift) come with the analysis.
     """
 
@@ -76,7 +77,6 @@ class Placing:
         return lift_off
 
     def _learn_sound_metal(self) -> None:
-        from eddyscan.analysis.inspect import response_for
         from eddyscan.analysis.readings import air_reading
         from eddyscan.formats.plans import read_plan
         from eddyscan.formats.records import read_record
@@ -87,6 +87,22 @@ class Placing:
             self._tilt_deg = {(int(plan.row[k]), int(plan.point[k])): float(plan.tilt_deg[k]) for k in scan}
             air = air_reading(read_record(self._inspection.file("record", "record.sqlite")).meta)
             most = float(plan.tilt_deg[scan].max())
-            self._response = response_for(self._inspection.technique(), air, largest_tilt_deg=most)
+            self._response = _sound_metal(self._inspection.technique(), air, most)
         except EddyscanError:
             self._response = None  # the readings are shown without lift-off
+
+
+def _sound_metal(technique: Technique, air_ohm: complex | None, largest_tilt_deg: float) -> SoundResponse:
+    from eddyscan.physics import sound_response as curves
+
+    coil = curves.technique_coil(technique)
+    if air_ohm is not None:
+        coil = curves.coil_by_air_reading(coil, air_ohm, technique.drive.frequency_hz)
+    return curves.sound_response(
+        coil,
+        curves.technique_conductor(technique),
+        technique.drive.frequency_hz,
+        air_ohm=air_ohm,
+        largest_lift_off_mm=2.0 * technique.analysis.lift_off_max_mm + 1.0,
+        largest_tilt_deg=largest_tilt_deg,
+    )

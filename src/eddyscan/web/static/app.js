@@ -187,7 +187,7 @@ class App {
     this.bar.fill.style.width = `${100 * share}%`;
     const states = { running: "", paused: " – PAUSED", stopping: " – STOPPING", stopped: " – stopped", failed: " – failed" };
     const count = job.total > 1 && Number.isInteger(job.total) ? ` ${Math.round(job.done)} of ${job.total}` : "";
-    this.bar.words.textContent = `${job.title}${job.active && job.what ? `: ${job.what}${count}` : ""}${states[job.state] || ""}`;
+    this.bar.words.textContent = `${job.title}${job.active && job.what ? `: ${job.what === "scan" ? "" : job.what}${count}` : ""}${states[job.state] || ""}`;
     const stopped = news.stop_ms !== null && !job.active ? `stage confirmed Stop after ${news.stop_ms.toFixed(0)} ms` : "";
     this.bar.left.textContent = stopped || (job.active && job.seconds_left !== null ? `${duration(job.seconds_left)} left` : "");
     if (!this.bar.words.isConnected) fill(at("progress"), this.bar.words, h("div", { class: "track" }, this.bar.fill), this.bar.left);

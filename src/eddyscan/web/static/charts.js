@@ -38,10 +38,10 @@ export class Strip {
   }
 
   draw({ time, values, count, title, unit, limits = [], marked = null, seconds = 0, scale = 1 }) {
-    const { c, width, height } = pen(this.canvas, 170);
+    const { c, width, height } = pen(this.canvas, 185);
     this.canvas.setAttribute("aria-label", `strip chart: ${title} [${unit}] against time`);
     c.fillStyle = css("--soft");
-    c.fillText(`${title} [${unit}]`, 8, 15);
+    c.fillText(`${title} [${unit}]`, 8, 22);
     if (!count) return c.fillText("no reading yet", width / 2 - 40, height / 2);
     const t1 = time[count - 1];
     const t0 = seconds ? Math.max(time[0], t1 - seconds) : time[0];
@@ -58,7 +58,7 @@ export class Strip {
     const room = (high - low || Math.abs(high) * 0.01 || 1) * 0.08;
     [low, high] = [low - room, high + room];
     const left = 64;
-    const box = { x: left, y: 22, w: width - left - 8, h: height - 46 };
+    const box = { x: left, y: 40, w: width - left - 8, h: height - 62 };
     const x = (t) => box.x + (t1 > t0 ? ((t - t0) / (t1 - t0)) * box.w : box.w);
     const y = (v) => box.y + (1 - (v - low) / (high - low)) * box.h;
     this.frame(c, box, { low, high, t0, t1, x, y });

@@ -58,5 +58,5 @@ export function spread(values, cut = 0.01) {
   if (!finite.length) return [0, 1];
   const low = finite[Math.floor(cut * (finite.length - 1))];
   const high = finite[Math.ceil((1 - cut) * (finite.length - 1))];
-  return high > low ? [low, high] : [low - 0.5, low + 0.5];
+  return high > low ? [low, high] : [low, low + (Math.abs(low) * 1e-3 || 1e-3)];
 }

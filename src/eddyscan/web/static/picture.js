@@ -111,7 +111,7 @@ export class Picture {
     const n = arrays.kind.length;
     const pale = new Uint8Array(3 * n).fill(128);
     this.viewer.setPath("route", arrays.coil, pale, { px: 1 });
-    const spots = facts.uncovered.filter((spot) => spot.centre_mm).flatMap((spot) => spot.centre_mm);
+    const spots = facts.uncovered.filter((spot) => spot.centre_mm && !spot.reason.includes("edge zone")).flatMap((spot) => spot.centre_mm);
     this.viewer.setPoints("uncovered", new Float32Array(spots), [209, 0, 108], { px: 16, lift: 0.004 });
   }
 
@@ -171,7 +171,7 @@ export class Picture {
     this.viewer.legend(null);
     const uncertainty = this.data.surface?.arrays.uncertainty_mm;
     if (step === "surface" && uncertainty) {
-      const [low, high] = spread(uncertainty, 0.02);
+      const [low, high] = [0, spread(uncertainty, 0.02)[1]];
       this.viewer.paintSurface(uncertainty, low, high, "cividis");
       this.viewer.legend({ title: "Uncertainty of the surface [mm]", low: number(low, 3), high: number(high, 3), map: "cividis" });
     } else if (step === "plan" && this.data.plan) this.viewer.legend(this.pathLegend);

@@ -45,6 +45,7 @@ export class Shelf {
   }
 
   draw() {
+    if (!this.inspections) return undefined;
     const words = this.words.value.trim().toLowerCase();
     const fits = (entry) =>
       (!words || `${entry.name} ${entry.part} ${entry.serial}`.toLowerCase().includes(words)) &&
