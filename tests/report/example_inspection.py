@@ -85,6 +85,7 @@ def example_record(plan: ScanPlan) -> tuple[ScanRecord, np.ndarray, np.ndarray]:
     z = (3.0 - 0.8 * np.exp(-lift)) + 1j * (40 - 9 * np.exp(-lift / 0.8)) + residual
     meta = {
         "T_stage_part": T_STAGE_PART.tolist(),
+        "alignment": {"how": "by the coil's field", "z_uncertainty_mm": 0.004, "scale": 1.0012},
         "devices": [
             {
                 "kind": "stage",
@@ -179,6 +180,7 @@ def whole_inspection(pitch_mm: float = 5.0, step_mm: float = 5.0, edge_mm: float
         indications=example_indications(),
         lift_off_mm=lift,
         residual_ohm=residual,
+        coarse_lift_off_mm=lift + 0.12 * np.sin(record.part_mm[:, 0] / 25),
         statistics={"lift_off_rms_um": 14.2, "noise_mohm": 1.0, "readings_used": len(record)},
         not_examined=(Uncovered("overload", 4.0, (20.0, 20.0, 33.0)),),
         deviations=("The index was doubled in rows 3 to 5 at the customer's request.",),

@@ -53,6 +53,7 @@ def test_refers_to_nothing_outside_itself(page_without_viewer: str) -> None:
 def test_drawings_follow_the_page_colours(page_without_viewer: str) -> None:
     drawings = re.findall(r"<svg.*?</svg>", page_without_viewer, re.DOTALL)
     assert len(drawings) > 10
+    assert all(re.match(r'<svg role="img" aria-label="[^"]{10,}"', drawing) for drawing in drawings)
     assert all("var(--muted)" in drawing for drawing in drawings if "<text" in drawing)
     assert not any(re.search(r"#0000(0[a-f]|1a)\b", drawing) for drawing in drawings)
 

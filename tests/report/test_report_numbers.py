@@ -35,7 +35,7 @@ from eddyscan.report.figures_signal import median_ohm, reading_maps
 from eddyscan.report.figures_surface import heights, profile
 from eddyscan.report.figures_views import view_picture
 from eddyscan.report.headline import headline
-from eddyscan.report.mesh_thinning import thinned
+from eddyscan.report.mesh_thinning import on_border, thinned
 from eddyscan.report.scene import scene_json
 from eddyscan.report.sections_result import false_call_basis, indication_table, reference_amplitude
 from eddyscan.report.words import flattened, label, number, percent, plus_minus
@@ -118,6 +118,16 @@ def test_a_thinned_mesh_keeps_vertices_and_form(most: int) -> None:
     assert faces.max() < len(keep)
     light = SurfaceMesh.from_triangles(mesh.vertices[keep], faces)
     assert light.area_mm2 == pytest.approx(mesh.area_mm2, rel=0.5)
+
+
+def test_a_thinned_mesh_keeps_its_outline_straight() -> None:
+    mesh = named_part("plate").top_mesh(2.0)
+    keep, faces = thinned(mesh, 1500)
+    rim = mesh.vertices[keep][on_border(faces)]
+    beside = np.minimum.reduce([rim[:, 0], 200 - rim[:, 0], rim[:, 1], 100 - rim[:, 1]])
+    np.testing.assert_allclose(beside, 0.0, atol=1e-9)
+    np.testing.assert_allclose(rim.min(axis=0)[:2], 0.0, atol=4.0)
+    np.testing.assert_allclose(rim.max(axis=0)[:2], [200.0, 100.0], atol=4.0)
 
 
 def test_a_small_mesh_stays_as_it_is() -> None:

@@ -61,6 +61,7 @@ class ReportContent:
     cscan, indications : what the analysis made of it
     lift_off_mm : (N,) [mm] lift-off of every reading as told by the probe; NaN unknown
     residual_ohm : (N,) [ohm] what lift-off and conductivity do not explain
+    coarse_lift_off_mm : (M,) [mm] lift-off of the coarse pass before the path was corrected; None for one pass
     statistics : names with units -> numbers, from the analysis
     not_examined : spots not covered for reasons found after planning (failed reference check, overload ...)
     deviations : departures from the procedure, in words
@@ -85,6 +86,7 @@ class ReportContent:
     indications: Sequence[Indication] | None = None
     lift_off_mm: Array | None = None
     residual_ohm: ComplexArray | None = None
+    coarse_lift_off_mm: Array | None = None
     statistics: Mapping[str, Any] = field(default_factory=dict)
     not_examined: Sequence[Uncovered] = ()
     deviations: Sequence[str] = ()

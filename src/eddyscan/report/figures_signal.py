@@ -128,11 +128,17 @@ def plane_figure(record: ScanRecord, lift_off_mm: Array | None, theme: Theme) ->
     return figure
 
 
-def lift_off_figure(lift_off_mm: Array, target_mm: float, theme: Theme) -> Figure:
-    """Draw how the actual lift-off is spread about the technique's value."""
+def lift_off_figure(lift_off_mm: Array, coarse_mm: Array | None, target_mm: float, theme: Theme) -> Figure:
+    """Draw how the actual lift-off is spread about the technique's value, before and after correction."""
     figure, axes = canvas(height_in=3.4, width_in=4.4)
     known = lift_off_mm[np.isfinite(lift_off_mm)]
-    axes.hist(known, bins=50, color=theme.accent, lw=0)
+    before = np.zeros(0) if coarse_mm is None else coarse_mm[np.isfinite(coarse_mm)]
+    bins = np.histogram_bin_edges(np.concatenate([known, before]), bins=60)
+    if before.size:
+        share = len(known) / len(before)
+        weights = np.full(before.size, share)
+        axes.hist(before, bins=bins, weights=weights, color=theme.muted, alpha=0.55, lw=0, label="coarse pass, scaled")
+    axes.hist(known, bins=bins, color=theme.accent, lw=0, label="corrected pass" if before.size else None)
     axes.axvline(target_mm, color=theme.second, lw=1.4, label=f"technique: {target_mm:g} mm")
     axes.set_xlabel("lift-off told by the probe [mm]")
     axes.set_ylabel("readings")

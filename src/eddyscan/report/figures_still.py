@@ -15,7 +15,7 @@ from eddyscan.report.theme import Theme, canvas
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_VERTICES = 4000
+MOST_VERTICES = 25_000
 
 
 def projected(points_mm: Array) -> tuple[Array, Array]:

@@ -74,7 +74,7 @@ def _environment() -> Any:
     environment.filters |= {
         "kind": _kind,
         "png": _png,
-        "svg": lambda draw: Markup(to_svg(draw)),
+        "svg": lambda chart: Markup(to_svg(chart.draw, chart.caption)),
         "json_safe": lambda text: Markup(text.replace("</", "<\\/")),
         "inline": Markup,
     }

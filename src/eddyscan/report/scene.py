@@ -15,7 +15,7 @@ from eddyscan.report.figures_signal import CRACK_CHANNELS
 from eddyscan.report.mesh_thinning import thinned
 from eddyscan.report.words import label
 
-MOST_VERTICES = 20_000
+MOST_VERTICES = 30_000
 MOST_PATH_POINTS = 20_000
 GREY, GREY_SHARE = "#8a949d", 0.02
 

@@ -6,7 +6,7 @@ from eddyscan.report.blocks import Section
 from eddyscan.report.content import ReportContent
 from eddyscan.report.sections_part import equipment, procedure, result
 from eddyscan.report.sections_result import coverage, indications, references, signals
-from eddyscan.report.sections_scan import plan, positions
+from eddyscan.report.sections_scan import alignment, plan, positions
 from eddyscan.report.sections_surface import nominal, surface, views
 from eddyscan.report.sections_trace import provenance, signatures, truth
 
@@ -18,6 +18,7 @@ CHAPTERS = (
     surface,
     nominal,
     plan,
+    alignment,
     positions,
     references,
     signals,

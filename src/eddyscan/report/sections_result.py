@@ -76,7 +76,8 @@ def signals(content: ReportContent) -> Section:
         blocks.append(Chart(partial(cscan_figure, content.cscan, names), "C-scan on the surface, seen from above."))
     if content.lift_off_mm is not None and np.isfinite(content.lift_off_mm).any():
         target = content.technique.scan.lift_off_mm
-        blocks.append(Chart(partial(lift_off_figure, content.lift_off_mm, target), "Actual lift-off.", half=True))
+        draw = partial(lift_off_figure, content.lift_off_mm, content.coarse_lift_off_mm, target)
+        blocks.append(Chart(draw, "Actual lift-off, told by the probe.", half=True))
     blocks.append(Chart(partial(plane_figure, record, content.lift_off_mm), "Raw impedance, unrotated.", half=True))
     blocks.append(Chart(partial(strip_figure, record, content.residual_ohm), "Raw signals over time."))
     if content.statistics:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
+from typing import Any
 
 from eddyscan.core.plan import Coverage, ScanPlan
 from eddyscan.report.blocks import Block, Chart, Facts, Note, Section, Table
 from eddyscan.report.content import ReportContent
 from eddyscan.report.figures_plan import path_figure, predicted_figure
 from eddyscan.report.figures_position import axis_errors, error_figure, longest_row, position_figure
+from eddyscan.report.tables import facts_of
 from eddyscan.report.words import number, percent
 
 
@@ -64,6 +67,26 @@ def _pose_facts(planned: ScanPlan) -> Facts:
         rows.append((f"{name}, least / mean / largest", f"{texts} {unit}"))
     rows.append(("lift-off, standard deviation", f"{1000 * planned.lift_off_mm[scan].std():.1f} µm"))
     return Facts(tuple(rows), "Predicted for the readings")
+
+
+def alignment(content: ReportContent) -> Section | None:
+    """Say how the part was found on the stage and what the coil read in air."""
+    if content.record is None:
+        return None
+    meta = content.record.meta
+    details = meta.get("alignment")
+    if not isinstance(details, Mapping):
+        text = "The record does not say how the part was found on the stage."
+        return Section("alignment", "Part on the stage", "", (Note(text, "missing"), _pose_table(meta)))
+    plain = {key: value for key, value in details.items() if not key.startswith("T_")}
+    return Section("alignment", "Part on the stage", "", (facts_of(plain, "Alignment", wide=True), _pose_table(meta)))
+
+
+def _pose_table(meta: Mapping[str, Any]) -> Table:
+    """Return T_stage_part as a table an auditor can type in again."""
+    rows = tuple(tuple(f"{value:.6f}" for value in row) for row in meta["T_stage_part"])
+    title = "Pose of the part on the stage: T_stage_part [rotation, mm]"
+    return Table(("x part", "y part", "z part", "origin [mm]"), rows, title, frozenset())
 
 
 def positions(content: ReportContent) -> Section:

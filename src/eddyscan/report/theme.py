@@ -125,15 +125,16 @@ def map_axes(axes: Axes, title: str) -> None:
     axes.grid(visible=False)
 
 
-def to_svg(draw: Callable[[Theme], Figure]) -> str:
-    """Return the drawing as an SVG element whose colours follow the page."""
+def to_svg(draw: Callable[[Theme], Figure], described: str = "") -> str:
+    """Return the drawing as an SVG element whose colours follow the page; `described` is read out by screen readers."""
     from matplotlib import rc_context
 
     text = io.StringIO()
     with rc_context(settings(PAGE)):
         draw(PAGE).savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
-    svg = svg[svg.index("<svg") :]
+    label = described.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
+    svg = f'<svg role="img" aria-label="{label}"' + svg[svg.index("<svg") + 4 :]
     for stand_in, variable in VARIABLES.items():
         svg = svg.replace(stand_in, variable)
     return svg
