@@ -162,3 +162,18 @@ def test_a_lost_instrument_is_a_link_error():
         rig.instrument.read()
         with pytest.raises(LinkError, match="failed to read"):
             rig.instrument.read()
+
+
+def test_a_tilt_axis_turns_the_probe_about_its_face():
+    settings = virtual_rig("plate", seed=2, tilt_axis="b")
+    assert RigSettings.model_validate(tomllib.loads(rig_text(settings))) == settings
+    with open_rig(settings) as rig:
+        assert [axis.name for axis in rig.stage.axes()] == ["x", "y", "z", "b"]
+        rig.stage.home()
+        rig.instrument.configure(Drive())
+        for angle in (0.0, 12.0):
+            rig.stage.move(np.array([100.0, 100.0, 38.0, angle]))
+            rig.instrument.read()
+        log = rig.cell.truth_log()
+        assert log["tilt_deg"][1] - log["tilt_deg"][0] == pytest.approx(12.0, abs=0.8)
+        assert log["lift_off_mm"][1] == pytest.approx(log["lift_off_mm"][0], abs=0.2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import logging
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, Self, cast, get_type_hints
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
@@ -18,7 +18,7 @@ from eddyscan.core.parts import named_part
 from eddyscan.core.technique import Section
 from eddyscan.devices.clock import ScaledClock, WallClock
 from eddyscan.devices.protocols import Clock, DepthCamera, EddyInstrument, Stage
-from eddyscan.devices.sim.world_settings import WorldSettings
+from eddyscan.devices.sim.world_settings import WorldSettings, WorldStage
 
 if TYPE_CHECKING:
     from eddyscan.devices.sim.world import VirtualCell
@@ -72,6 +72,20 @@ class AlignmentTable(Section):
         return transform(turn.as_matrix(), (self.x_mm, self.y_mm, self.z_mm))
 
 
+class ReferenceTable(Section):
+    """Reference block that stays on the stage, its notches across x."""
+
+    x_mm: float = Field(description="corner of its top with the least x and y [stage]")
+    y_mm: float
+    z_mm: float = Field(description="stage reading at which the coil touches its top")
+    length_mm: float = Field(80.0, gt=0, description="along x")
+    width_mm: float = Field(16.0, gt=0, description="along y")
+    notch_x_mm: tuple[float, ...] = Field((20.0, 40.0, 60.0), description="places of the notches from the corner")
+    notch_depths_mm: tuple[float, ...] = (0.2, 0.5, 1.0)
+    notch_length_mm: float = Field(5.0, gt=0)
+    conductivity_ms_m: float = Field(19.0, gt=0.1, le=65.0)
+
+
 class RigSettings(Section):
     """The whole of rig.toml."""
 
@@ -79,6 +93,7 @@ class RigSettings(Section):
     instrument: InstrumentTable = InstrumentTable()
     camera: CameraTable = CameraTable()
     alignment: AlignmentTable | None = Field(None, description="table with x_mm, y_mm, z_mm, yaw_deg if known")
+    reference: ReferenceTable | None = Field(None, description="table with x_mm, y_mm, z_mm of a reference block")
     world: WorldSettings | None = Field(None, description="the virtual cell; leave out for a real rig")
 
     @property
@@ -87,13 +102,49 @@ class RigSettings(Section):
         return self.stage.travel_mm
 
 
-def virtual_rig(part: str = "block-a", seed: int = 1) -> RigSettings:
+def virtual_rig(part: str = "block-a", seed: int = 1, *, tilt_axis: Literal["none", "a", "b"] = "none") -> RigSettings:
     """Return the settings of a virtual cell with one named part.
 
-    Raises InputError when the part is unknown.
+    Parameters
+    ----------
+    part, seed
+        What lies in the cell.
+    tilt_axis
+        A fourth axis that turns the probe about the stage's x (a) or y (b).
+
+    Raises
+    ------
+    InputError
+        When the part is unknown.
     """
     named_part(part)
-    return RigSettings(world=WorldSettings(part=part, seed=seed))
+    world = WorldSettings(part=part, seed=seed, stage=WorldStage(tilt_axis=tilt_axis))
+    stage = StageTable() if tilt_axis == "none" else StageTable(options={"axes": _axes_with_tilt(tilt_axis)})
+    return RigSettings(stage=stage, reference=_reference_of(world), world=world)
+
+
+def _axes_with_tilt(name: str) -> list[dict[str, Any]]:
+    from eddyscan.devices.drivers.zaber_settings import STUDY_CHAIN, ZaberAxis
+
+    tilt = ZaberAxis(name=name, model="X-RSW60C", device=4, unit="deg", travel=120.0, lower=-60.0, microstep=0.0009375)
+    return [axis.model_dump(exclude_defaults=True) for axis in (*STUDY_CHAIN, tilt)]
+
+
+def _reference_of(world: WorldSettings) -> ReferenceTable:
+    """Return the block as its drawing and the rig's fitter describe it; the true place is a little off."""
+    block = world.reference
+    count = len(block.notch_depths_mm)
+    return ReferenceTable(
+        x_mm=block.corner_mm[0],
+        y_mm=block.corner_mm[1],
+        z_mm=block.corner_mm[2],
+        length_mm=block.size_mm[0],
+        width_mm=block.size_mm[1],
+        notch_x_mm=tuple((k + 1) * block.size_mm[0] / (count + 1) for k in range(count)),
+        notch_depths_mm=block.notch_depths_mm,
+        notch_length_mm=block.notch_length_mm,
+        conductivity_ms_m=world.conductivity_ms_m,
+    )
 
 
 def rig_text(settings: RigSettings, heading: str = HEADING) -> str:

@@ -84,7 +84,8 @@ def path_truth(
     columns = {name: np.asarray(log[name], dtype=float) for name in ("lift_off_mm", "tilt_deg", "near_edge")}
     stage_mm = np.asarray(log["stage_mm"], dtype=float).reshape(-1, 3)
     if record is None:
-        which = np.flatnonzero(columns["lift_off_mm"] < OVER_PART_MM)
+        over = np.array([body == "part" for body in log.get("body", ["part"] * len(stage_mm))], dtype=bool)
+        which = np.flatnonzero(over & (columns["lift_off_mm"] < OVER_PART_MM))
         result: dict[str, Any] = {"readings": len(which)}
     else:
         found = match_readings(log, record)
@@ -128,6 +129,8 @@ def indication_truth(
     feet = None
     if log is not None:
         feet = np.asarray(log["foot_mm"], dtype=float).reshape(-1, 3)
+        over = np.array([body == "part" for body in log.get("body", ["part"] * len(feet))], dtype=bool)
+        feet[~over] = np.inf
         if record is not None:
             found = match_readings(log, record)
             feet = feet[found[found >= 0]]

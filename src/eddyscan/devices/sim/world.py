@@ -25,9 +25,26 @@ from eddyscan.devices.sim.world_probe import ProbeOverPart, StagePosition, TrueR
 from eddyscan.devices.sim.world_scene import build_scene
 from eddyscan.devices.sim.world_settings import WorldSettings
 from eddyscan.devices.sim.zaber import Fault, ZaberSimulator
-from eddyscan.devices.sim.zaber_settings import ZaberSettings
+from eddyscan.devices.sim.zaber_settings import STUDY_AXES, SimulatedAxis, ZaberSettings
 
 __all__ = ["CellAddresses", "VirtualCell", "WorldSettings"]
+
+
+TILT_AXIS: dict[str, Any] = {
+    "model": "X-RSW60C",
+    "serial_number": 104,
+    "device_id": 99003,
+    "unit": "deg",
+    "travel": 120.0,
+    "lower": -60.0,
+    "microstep": 0.0009375,
+    "max_speed": 60.0,
+    "accuracy": 0.08,
+    "backlash": 0.02,
+    "noise": 0.001,
+    "start": 0.0,
+}
+"""Microstep of the X-RSW60C as published; the rest PLACEHOLDERS."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +100,13 @@ class VirtualCell:
     def stage(self) -> ZaberSimulator:
         """The simulated controller: faults are injected here."""
         s, faults = self.settings.stage, self.settings.faults
+        tilt = () if s.tilt_axis == "none" else (SimulatedAxis(name=s.tilt_axis, **TILT_AXIS),)
         options = ZaberSettings(
-            layout=s.layout, firmware=s.firmware, reply_delay_s=s.reply_delay_s, seed=self.settings.seed
+            layout=s.layout,
+            firmware=s.firmware,
+            reply_delay_s=s.reply_delay_s,
+            seed=self.settings.seed,
+            axes=(*STUDY_AXES, *tilt),
         )
         simulator = ZaberSimulator(options, self.clock)
         if faults.stage_fault != "none":
@@ -152,6 +174,7 @@ class VirtualCell:
             "lift_off_mm": [t.lift_off_mm for _, t in readings],
             "tilt_deg": [t.tilt_deg for _, t in readings],
             "near_edge": [bool(t.near_edge) for _, t in readings],
+            "body": [t.body for _, t in readings],
         }
 
     def close(self) -> None:

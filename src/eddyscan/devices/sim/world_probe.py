@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from eddyscan.core.frames import Array, apply, invert
-from eddyscan.devices.sim.flaws_response import SlotSignals
 from eddyscan.devices.sim.instrument_physics import CoilResponse, edge_zone_mm, real_coil
 from eddyscan.devices.sim.instrument_physics_noise import ReadingNoise
+from eddyscan.devices.sim.world_body import Body, reference_block
 from eddyscan.devices.sim.world_facts import CellFacts
 from eddyscan.devices.sim.world_foot import FootFinder
 from eddyscan.devices.sim.world_placement import knocked
@@ -37,6 +37,7 @@ class TrueReading:
     edge_mm : distance of the spot to the outline, negative beyond it
     near_edge : whether the reading is within the zone that has no physics
     curvature_per_mm : sum of the principal curvatures at the spot
+    body : "part", or "reference" for the block; then `part_mm` and `foot_mm` are in the block's frame
     """
 
     time_s: float
@@ -48,37 +49,39 @@ class TrueReading:
     edge_mm: float
     near_edge: bool
     curvature_per_mm: float
+    body: str = "part"
 
 
 class ProbeOverPart:
     """The coil on the true part, at the place where the stage really is."""
 
     def __init__(self, settings: WorldSettings, facts: CellFacts) -> None:
-        self._settings, self._flaws = settings, facts.flaws
-        self._finder = FootFinder(facts.part)
+        self._settings = settings
         self._T_part_stage = invert(facts.T_stage_part)
         self._T_knocked = invert(knocked(facts.T_stage_part, settings.faults.part_shift_mm))
         lean = settings.placement.probe_tilt_deg * np.random.default_rng([settings.seed, 10]).uniform(-1, 1, 2)
-        self._axis_stage = Rotation.from_euler("xy", lean, degrees=True).apply([0.0, 0.0, -1.0])
+        self._axis_stage = np.asarray(Rotation.from_euler("xy", lean, degrees=True).apply([0.0, 0.0, -1.0]))
         self.coil = real_coil(settings.coil, settings.instrument.coil_tolerance, settings.seed)
         self.conductor = Conductor.half_space(settings.conductivity_ms_m)
+        metal = (self.coil, self.conductor)
+        self._body = Body("part", FootFinder(facts.part), facts.flaws, metal)
+        self._reference = reference_block(settings, metal)
         self.noise = ReadingNoise(settings.instrument, settings.seed)
         self.history: list[tuple[complex, TrueReading]] = []
         self._responses: dict[float, CoilResponse] = {}
-        self._signals: dict[float, SlotSignals] = {}
 
     def pose(self, stage_mm: Array, time_s: float) -> TrueReading:
-        """Return the truth for a coil position (3,) [mm, stage]."""
-        shift_after = self._settings.faults.part_shift_after
-        T = self._T_knocked if shift_after and len(self.history) >= shift_after else self._T_part_stage
+        """Return the truth for true axis readings (n_axes,) [mm, deg, stage]."""
+        body, T = self._below(stage_mm)
         at = apply(T, stage_mm[None, :3])[0]
-        foot = self._finder.at(at)
-        axis = T[:3, :3] @ self._axis_stage
+        foot = body.finder.at(at)
+        axis = T[:3, :3] @ self._probe_axis(stage_mm)
         tilt = float(np.degrees(np.arccos(np.clip(-axis @ foot.normal, -1.0, 1.0))))
         near = foot.edge_mm < edge_zone_mm(self.coil)
         return TrueReading(
-            time_s, stage_mm[:3], at, foot.point_mm, foot.distance_mm, tilt, foot.edge_mm, near, foot.curvature_per_mm
-        )
+            time_s=time_s, stage_mm=stage_mm[:3], part_mm=at, foot_mm=foot.point_mm, lift_off_mm=foot.distance_mm,
+            tilt_deg=tilt, edge_mm=foot.edge_mm, near_edge=near, curvature_per_mm=foot.curvature_per_mm, body=body.name,
+        )  # fmt: skip
 
     def feel(self, stage_mm: Array, frequency_hz: float, time_s: float) -> tuple[complex, TrueReading]:
         """Return the coil's own impedance [ohm] at a place, and the truth behind it."""
@@ -89,14 +92,14 @@ class ProbeOverPart:
             bulge = curvature_gap_mm(self.coil, np.array(gap), np.array(truth.curvature_per_mm))
             gap = max(gap + float(bulge), 0.0)
         z = response.impedance_ohm(gap, truth.tilt_deg)
-        if truth.edge_mm > 0 and self._flaws:
-            z += self._slots(frequency_hz).change_ohm(truth.foot_mm, response.upright_lift_off_mm(z))
+        if truth.edge_mm > 0:
+            body, _ = self._below(stage_mm)
+            z += body.slots_ohm(truth.foot_mm, response.upright_lift_off_mm(z), frequency_hz)
         return z, truth
 
     def prepare(self, frequency_hz: float) -> None:
         """Begin to build the slots' tables for a frequency the instrument was set to."""
-        if self._flaws:
-            self._slots(frequency_hz)
+        self._body.prepare(frequency_hz)
 
     def air_ohm(self, frequency_hz: float) -> complex:
         """Return j omega L0 of the real coil [ohm]."""
@@ -106,10 +109,20 @@ class ProbeOverPart:
         """File the truth under the impedance that the wire carried, which is all the software will know."""
         self.history.append((as_read_ohm, truth))
 
-    def _slots(self, frequency_hz: float) -> SlotSignals:
-        if frequency_hz not in self._signals:
-            self._signals[frequency_hz] = SlotSignals(self._flaws, self.coil, self.conductor, frequency_hz)
-        return self._signals[frequency_hz]
+    def _below(self, stage_mm: Array) -> tuple[Body, Array]:
+        """Return the body the coil is over and T_body_stage."""
+        if self._reference is not None and self._reference.below(stage_mm):
+            return self._reference, self._reference.T_body_stage
+        shift_after = self._settings.faults.part_shift_after
+        shifted = shift_after and len(self.history) >= shift_after
+        return self._body, self._T_knocked if shifted else self._T_part_stage
+
+    def _probe_axis(self, stage_mm: Array) -> Array:
+        """Return the direction out of the coil face (3,) [stage], turned by the tilt axis if there is one."""
+        if len(stage_mm) < 4:
+            return self._axis_stage
+        about = "x" if self._settings.stage.tilt_axis == "a" else "y"
+        return np.asarray(Rotation.from_euler(about, float(stage_mm[3]), degrees=True).apply(self._axis_stage))
 
     def _response(self, frequency_hz: float) -> CoilResponse:
         if frequency_hz not in self._responses:

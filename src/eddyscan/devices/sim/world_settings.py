@@ -72,6 +72,9 @@ class WorldStage(Section):
 
     layout: Literal["chain", "mcc"] = Field("chain", description="one device per axis, or one controller with all axes")
     firmware: Literal["7.38", "6.28"] = "7.38"
+    tilt_axis: Literal["none", "a", "b"] = Field(
+        "none", description="a turns the probe about the stage's x, b about y; the coil face stays where x, y, z say"
+    )
     reply_delay_s: float = Field(0.001, ge=0, description="time of one answer; a serial line has 0.0043, s")
 
 
@@ -86,6 +89,18 @@ class WorldPlacement(Section):
     corner_error_deg: float = Field(0.1, ge=0, description="jog to the corner: standard deviation, deg")
     rough_error_mm: float = Field(3.0, ge=0, description="rough placing by eye: largest error per axis, mm")
     rough_error_deg: float = Field(3.0, ge=0, description="rough placing by eye: largest yaw error, deg")
+
+
+class WorldReference(Section):
+    """Reference block beside the part: flat, of the part's metal, eroded notches across it."""
+
+    present: bool = True
+    corner_mm: tuple[float, float, float] = Field((30.0, 3.0, 12.0), description="corner of its top [mm, stage]")
+    size_mm: tuple[float, float] = Field((80.0, 16.0), description="along x, along y, mm")
+    notch_depths_mm: tuple[float, ...] = Field((0.2, 0.5, 1.0), description="evenly spread along x, mm")
+    notch_length_mm: float = Field(5.0, gt=0, description="across the block, mm")
+    notch_opening_mm: float = Field(0.1, gt=0)
+    place_error_mm: float = Field(0.03, ge=0, description="standard deviation of where it is screwed down, mm")
 
 
 class WorldFlaw(Section):
@@ -133,4 +148,5 @@ class WorldSettings(Section):
     instrument: WorldInstrument = WorldInstrument()
     stage: WorldStage = WorldStage()
     placement: WorldPlacement = WorldPlacement()
+    reference: WorldReference = WorldReference()
     faults: WorldFaults = WorldFaults()
