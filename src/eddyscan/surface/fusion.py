@@ -19,6 +19,7 @@ from eddyscan.surface.free_form import fuse_free_form
 from eddyscan.surface.grid_mesh import inside_polygon, mesh_inside, without_vertices
 from eddyscan.surface.height_field import HeightField, fit_height_field
 from eddyscan.surface.part_frame import PartFrame
+from eddyscan.surface.uncertainty import estimate_uncertainty
 from eddyscan.surface.view import View
 
 CELL_MM = 1.0
@@ -111,7 +112,7 @@ def _fuse_height_field(views: Sequence[View], part: PartFrame, settings: Surface
     slope = [field.spline.at(xy[:, 0], xy[:, 1], *d) for d in ((1, 0), (0, 1))]
     normals = np.stack([-slope[0], -slope[1], np.ones(len(xy))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    uncertainty = np.full(len(xy), field.scale_mm / 3)
+    uncertainty = estimate_uncertainty(field, cells).along_normal(xy, normals[:, 2])
     return Fused(SurfaceMesh(vertices, faces, normals, uncertainty), warnings, "height field")
 
 

@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from eddyscan.core.frames import Array
 from eddyscan.surface.cells import HeightCells
-from eddyscan.surface.spline import GridFit, HeightSpline, SplineBasis
+from eddyscan.surface.spline import GridFit, HeightSpline, SplineBasis, adaptive_weights
 
-KNOT_MM = 4.0
+KNOT_MM = 2.5
 ROUGH_KNOT_MM = 6.0
 MAX_COEFFICIENTS = 9000
 SCALE_FLOOR_MM = 0.05
 TUKEY = 4.685
-SMOOTHING = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-ROUNDS = 8
+SMOOTHING = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+SINGLE_VIEW_SMOOTHING = 100.0
+ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,13 @@ def fit_height_field(cells: HeightCells, inside: NDArray[np.bool_]) -> HeightFie
     state = _State(cells, fit, base, start)
     for _ in range(3):
         state.step(10.0)
-    smoothing = _chosen_smoothing(state) if len(cells.height) > 1 else 10.0
+    smoothing = SINGLE_VIEW_SMOOTHING
+    if len(cells.height) > 1:
+        state.step(_chosen_smoothing(state, SMOOTHING[::2]))
+        for _ in range(2):
+            fit.hold(adaptive_weights(state.coefficients))
+            state.step(10.0)
+        smoothing = _chosen_smoothing(state, SMOOTHING)
     factor = np.zeros(0)
     for _ in range(ROUNDS):
         factor = state.step(smoothing)
@@ -136,12 +143,12 @@ class _State:
         return factor
 
 
-def _chosen_smoothing(state: _State) -> float:
+def _chosen_smoothing(state: _State, choices: tuple[float, ...]) -> float:
     """Return the penalty that predicts a left-out view best."""
     robust, level = state.robust, state.level
     total, moment = robust.sum(axis=0), (robust * level).sum(axis=0)
     losses = []
-    for smoothing in SMOOTHING:
+    for smoothing in choices:
         loss = count = 0.0
         for k in range(len(robust)):
             weight = np.maximum(total - robust[k], 0.0)
@@ -152,4 +159,4 @@ def _chosen_smoothing(state: _State) -> float:
             loss += float((robust[k][both] * difference**2).sum())
             count += float(robust[k][both].sum())
         losses.append(loss / max(count, 1e-9))
-    return SMOOTHING[int(np.argmin(losses))]
+    return choices[int(np.argmin(losses))]

@@ -14,7 +14,7 @@ from eddyscan.core.registration import Registration
 from eddyscan.surface.height_map import height_map
 from eddyscan.surface.pose_search import PairSearch
 from eddyscan.surface.refine import JointResult, joint_refinement, pair_quality
-from eddyscan.surface.table import find_table, table_in
+from eddyscan.surface.table import find_table, level_table, table_in
 from eddyscan.surface.view import View
 from eddyscan.surface.view_graph import ViewGraph, connect
 
@@ -63,6 +63,11 @@ def register(images: Sequence[DepthImage], views: Sequence[View], *, progress: P
     progress("registering all views together", 0, 1)
     joint = joint_refinement([views[k].surfels for k in kept], start, reference=kept.index(graph.reference))
     progress("registering all views together", 1, 1)
+    level = level_table(
+        [replace(views[k], T_world_camera=T) for k, T in zip(kept, joint.poses, strict=True)], joint.centre
+    )
+    poses = tuple(level @ T for T in joint.poses)
+    joint = replace(joint, poses=poses, centre=apply(level, joint.centre[None])[0])
     return _searched(views, graph, joint, kept)
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.ndimage import uniform_filter
 
 from eddyscan.core.frames import Array
 
@@ -78,7 +79,11 @@ class GridFit:
         self.Bx, self.By = basis_x.matrix(x), basis_y.matrix(y)
         self._products_x = [_offset_products(self.Bx, d) for d in range(-DEGREE, DEGREE + 1)]
         self._products_y = [_offset_products(self.By, d) for d in range(-DEGREE, DEGREE + 1)]
-        self._penalty = _penalty_bands(basis_x.size, basis_y.size)
+        self.hold(uniform_weights(basis_x.size, basis_y.size))
+
+    def hold(self, weights: PenaltyWeights) -> None:
+        """Set how strongly each second difference is penalised from now on."""
+        self._penalty = _penalty_bands(self.basis_x.size, self.basis_y.size, weights)
 
     def solve(self, weight: Array, height: Array, smoothing: float) -> tuple[Array, Array]:
         """Return coefficients (kx, ky) and the banded Cholesky factor of the normal matrix."""
@@ -120,29 +125,53 @@ def _offset_products(B: Array, d: int) -> Array:
     return product
 
 
-def _penalty_bands(kx: int, ky: int) -> Array:
-    """Return |D2 c|^2 along x and y plus twice the mixed difference, upper banded."""
+@dataclass(frozen=True)
+class PenaltyWeights:
+    """How strongly each second difference is held: along x (kx-2, ky), y (kx, ky-2) and mixed (kx-1, ky-1)."""
 
-    def square(n: int, order: int) -> Array:
-        D = np.diff(np.eye(n), order, axis=0)
-        return D.T @ D
+    along_x: Array
+    along_y: Array
+    mixed: Array
 
-    full_x = [(square(kx, 2), np.eye(ky)), (np.eye(kx), square(ky, 2)), (2 * square(kx, 1), square(ky, 1))]
-    width = DEGREE * ky + DEGREE
-    bands = np.zeros((width + 1, kx * ky))
-    for Px, Py in full_x:
-        for dx in range(DEGREE):
-            px = np.diagonal(Px, dx)
-            for dy in range(-(DEGREE - 1), DEGREE):
-                shift = dx * ky + dy
+
+def uniform_weights(kx: int, ky: int) -> PenaltyWeights:
+    """Return the weights of the plain P-spline: the mixed difference counts twice, as in a thin plate."""
+    return PenaltyWeights(np.ones((kx - 2, ky)), np.ones((kx, ky - 2)), np.full((kx - 1, ky - 1), 2.0))
+
+
+def adaptive_weights(coefficients: Array) -> PenaltyWeights:
+    """Return weights that let the surface bend where it already does.
+
+    Each second difference is weighted by the inverse of its own local size, so
+    that the penalty acts like the absolute value of the curvature: a boss keeps
+    its flanks while the plain around it stays smooth.
+    """
+    sizes = [np.abs(np.diff(coefficients, 2, axis=0)), np.abs(np.diff(coefficients, 2, axis=1))]
+    sizes.append(np.abs(np.diff(np.diff(coefficients, axis=0), axis=1)))
+    local = [uniform_filter(s, 3, mode="nearest") for s in sizes]
+    typical = max(float(np.median(np.concatenate([s.ravel() for s in local]))), 1e-6)
+    held = [np.clip(1.5 * typical / (s + 0.5 * typical), 0.01, 3.0) for s in local]
+    return PenaltyWeights(held[0], held[1], 2.0 * held[2])
+
+
+def _penalty_bands(kx: int, ky: int, weights: PenaltyWeights) -> Array:
+    """Return sum w (difference)^2 in upper banded form."""
+    bands = np.zeros((DEGREE * ky + DEGREE + 1, kx * ky))
+    second = ((0, 1.0), (1, -2.0), (2, 1.0))
+    stencils = (
+        (weights.along_x, [(k, 0, c) for k, c in second]),
+        (weights.along_y, [(0, k, c) for k, c in second]),
+        (weights.mixed, [(0, 0, 1.0), (1, 0, -1.0), (0, 1, -1.0), (1, 1, 1.0)]),
+    )
+    for weight, stencil in stencils:
+        nx, ny = weight.shape
+        for ax, ay, a in stencil:
+            for bx, by, b in stencil:
+                shift = (bx - ax) * ky + (by - ay)
                 if shift < 0:
                     continue
-                py = np.zeros(ky)
-                diagonal = np.diagonal(Py, dy)
-                py[max(0, -dy) : max(0, -dy) + len(diagonal)] = diagonal
-                block = np.zeros((kx, ky))
-                block[: len(px)] = px[:, None] * py[None]
-                bands[width - shift, shift:] += block.ravel()[: kx * ky - shift]
+                row = bands[len(bands) - 1 - shift].reshape(kx, ky)
+                row[bx : bx + nx, by : by + ny] += a * b * weight
     return bands
 
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eddyscan.core.errors import RegistrationError
-from eddyscan.core.frames import Array, transform
+from eddyscan.core.frames import Array, apply, from_rotation_vector, transform
 from eddyscan.surface.surfels import SurfelImage
+from eddyscan.surface.view import View
 
 SAMPLE = 4000
 HYPOTHESES = 300
 FIT_POINTS = 40_000
 TOLERANCE_SHARE = 0.004  # of the median distance
 MIN_SHARE = 0.08  # of the view's surfels that must lie on the table
+LEVEL_STRIDE = 7
+LEVEL_BAND_MM = 2.0
+LEVEL_RADIUS_MM = 120.0
 BELOW_LIMIT = 0.05  # share that may lie below it: nothing hangs under a table
 
 
@@ -118,3 +123,32 @@ def _table_frame(plane: Array) -> Array:
     rotation: NDArray[np.float64] = np.stack([x, np.cross(n, x), n])
     hit = np.array([0.0, 0.0, 1.0]) * (-d / n[2]) if n[2] < -0.05 else -d * n
     return transform(rotation, -rotation @ hit)
+
+
+def level_table(views: Sequence[View], centre: Array) -> Array:
+    """Return the small (4, 4) correction that puts the table of all views together on z = 0.
+
+    Each view's own plane carries that view's calibration error; together they
+    average. Table surfels count by their distance to `centre` (3,) [mm].
+    """
+    pieces = []
+    for view in views:
+        points = apply(view.T_world_camera, view.surfels.points[view.surfels.valid][::LEVEL_STRIDE].astype(np.float64))
+        pieces.append(points[np.abs(points[:, 2]) < LEVEL_BAND_MM])
+    points = np.concatenate(pieces)
+    if len(points) < 100:
+        return np.eye(4)
+    offset = points[:, :2] - centre[:2]
+    near = np.exp(-0.5 * (offset**2).sum(axis=1) / LEVEL_RADIUS_MM**2)
+    rows = np.column_stack([offset, np.ones(len(points))])
+    plane, residual = np.zeros(3), points[:, 2]
+    for _ in range(6):
+        scale = max(0.05, 1.4826 * float(np.median(np.abs(residual))))
+        weight = near * np.clip(1 - (residual / (4.685 * scale)) ** 2, 0, None) ** 2
+        plane = np.linalg.solve(rows.T @ (weight[:, None] * rows) + 1e-9 * np.eye(3), rows.T @ (weight * points[:, 2]))
+        residual = points[:, 2] - rows @ plane
+    tilt = np.array([plane[1], -plane[0], 0.0])  # turning about x by b takes z = b y to zero, and so on
+    small = from_rotation_vector(-tilt, np.zeros(3))
+    pivot = np.array([centre[0], centre[1], plane[2]])
+    small[:3, 3] = np.array([centre[0], centre[1], 0.0]) - small[:3, :3] @ pivot
+    return small
