@@ -72,7 +72,8 @@ class GrblSimulator:
                 sum(size * (np.sin(k * p + shift) - np.sin(shift)) for k, size, shift in waves)
                 for p, waves in zip(phase, self._waves, strict=True)
             ]
-            return np.array([axis.lower for axis in self.settings.axes]) + native + np.array(off)
+            lower = np.array([axis.lower for axis in self.settings.axes])
+            return np.asarray(lower + native + np.array(off), dtype=np.float64)
 
     def moving(self) -> bool:
         """Return whether the machine moves at this moment."""
