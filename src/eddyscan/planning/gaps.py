@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from eddyscan.core.frames import Array, BoolArray
+from eddyscan.core.frames import Array
 from eddyscan.planning.levels import Line
 from eddyscan.planning.verify import Samples
 
@@ -82,8 +82,3 @@ def window(line: Line, s: Array, low: float, high: float) -> Line | None:
     last = int(np.searchsorted(s, high - 1e-9, side="left")) - 1
     points = np.concatenate([cut[:1], line.points[inner], cut[1:]])
     return Line(points, line.face[first : last + 1], line.level, False, np.ones(len(points)))
-
-
-def widest(distance_mm: Array, inside: BoolArray) -> float:
-    """Return the largest distance (N,) [mm] among the samples inside, 0 when there are none."""
-    return float(distance_mm[inside].max()) if inside.any() else 0.0

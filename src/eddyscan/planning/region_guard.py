@@ -8,8 +8,11 @@ import numpy as np
 
 from eddyscan.core.frames import Array, BoolArray
 from eddyscan.core.plan import Uncovered
+from eddyscan.planning.heights import HeightMap
 from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.verify import Samples
+
+HIDDEN_MM = 0.5
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,14 @@ def tilt_guard(surface: SmoothSurface, tilt_deg: float) -> Array:
     return np.asarray(tilt_deg - np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1, 1))))
 
 
+def hidden_guard(surface: SmoothSurface, heights: HeightMap) -> Array:
+    """Return how far (V,) [mm] each vertex is from being covered by something above it."""
+    up = np.clip(surface.normals[:, 2], 0.05, 1.0)
+    # Within a cell of the map the surface itself rises by the slope.
+    own = HIDDEN_MM + 1.5 * heights.cell_mm * np.sqrt(1 - up**2) / up
+    return np.asarray(own - (heights.at(surface.vertices[:, 0], surface.vertices[:, 1]) - surface.vertices[:, 2]))
+
+
 def left_out(guards: list[Guard], samples: Samples, surface: SmoothSurface) -> list[Uncovered]:
     """Return the zones the guards take away; each spot counts for the first that does."""
     zones = []
@@ -38,11 +49,12 @@ def left_out(guards: list[Guard], samples: Samples, surface: SmoothSurface) -> l
         lost = open_to & (samples.of(guard.value, surface.faces) <= 0)
         open_to &= ~lost
         if lost.any():
-            zones.append(_zone(guard.reason, samples, lost))
+            zones.append(zone_of(guard.reason, samples, lost))
     return zones
 
 
-def _zone(reason: str, samples: Samples, which: BoolArray) -> Uncovered:
+def zone_of(reason: str, samples: Samples, which: BoolArray) -> Uncovered:
+    """Return the zone that the samples of a mask (N,) make up."""
     centre = samples.points[which].mean(axis=0)
     return Uncovered(reason, float(which.sum()) * samples.area_mm2, tuple(np.round(centre, 3).tolist()))
 

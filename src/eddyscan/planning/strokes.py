@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eddyscan.core.frames import Array
+from eddyscan.core.frames import Array, BoolArray
 from eddyscan.planning.levels import Line
 from eddyscan.planning.loops import steps_in_loop
 from eddyscan.planning.smooth import SmoothSurface
@@ -85,3 +85,18 @@ def _stations(length: float, step: float, *, closed: bool) -> Array:
     over = length - n * step * (1 + SPACING_OF_STEP)
     trim = float(np.clip(over / 2, 0.0, TRIM_OF_STEP * step))
     return np.linspace(trim, length - trim, n + 1)
+
+
+def parts_of(stroke: Stroke, keep: BoolArray) -> list[Stroke]:
+    """Return the runs of a stroke's readings where the mask (N,) is true; a loop cut once is open."""
+    if keep.all():
+        return [stroke]
+    points, normals, mask = stroke.points, stroke.normals, keep
+    if stroke.closed:
+        first = -int(np.argmin(mask[:-1]))
+        points, normals = np.roll(points[:-1], first, axis=0), np.roll(normals[:-1], first, axis=0)
+        mask = np.roll(mask[:-1], first)
+    s = np.concatenate([[0.0], np.cumsum(surface_distance(points[:-1], points[1:], normals[:-1], normals[1:]))])
+    edge = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
+    runs = zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True)
+    return [Stroke(points[a:b], normals[a:b], s[a:b] - s[a], stroke.level, False) for a, b in runs]
