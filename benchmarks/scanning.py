@@ -151,9 +151,10 @@ def main() -> None:
         ]
     body = "    python -m benchmarks.scanning --fine\n\n| | required | measured |\n|---|---|---|\n" + "\n".join(rows)
     body += (
-        "\n\nVirtual cell with the vendor's library over TCP; speeds (29, 29, 24 mm/s) and accelerations (200 mm/s2) of "
-        "the simulated axes are placeholders. The lower bound is row length over speed plus every link and approach at its "
-        "planned speed from rest to rest. Smear: recorded minus true position, rows there minus rows back. Seed 1.\n"
+        "\n\nVirtual cell with the vendor's library over TCP; speeds (29, 29, 24 mm/s) and accelerations (200 mm/s2) "
+        "of the simulated axes are placeholders. The lower bound is row length over speed plus every link and approach "
+        "at its planned speed from rest to rest. Smear: recorded minus true position, rows there minus rows back. "
+        "Seed 1.\n"
     )
     print(body)
     if given.write:

@@ -7,6 +7,7 @@ slope sees more.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,53 +25,74 @@ LIFT_MM = 0.2
 LEAST_CONTRAST = 5.0  # change over a lift in standard deviations of a reading
 
 
+@dataclass(frozen=True)
+class _Reference:
+    """A pose, its reading at the start, and how that changes with lift-off."""
+
+    index: int
+    at_start: complex
+    ohm_per_mm: float
+
+
 class PartWatch:
-    """The reference point of one run: its reading at the start and how it changes with lift-off."""
+    """Reference points of one run: both ends of its first row, so that one is never far."""
 
     def __init__(self, scan: Scan) -> None:
         self._scan = scan
-        self._index = int(np.flatnonzero(scan.plan.kind == SCAN)[0])
-        target = scan.targets[self._index]
-        hop(scan, target)
-        self.at_start, noise = self._read()
-        scan.stage.move(with_z(target, float(target[2]) + LIFT_MM), scan.technique.scan.approach_speed_mm_s)
+        self._references: list[_Reference] = []
+        first = int(np.flatnonzero(scan.plan.kind == SCAN)[0])
+        hop(scan, scan.targets[first])
+        self.add(first)
+
+    @property
+    def references(self) -> int:
+        """Return how many points can be looked at."""
+        return len(self._references)
+
+    def add(self, index: int) -> None:
+        """Take the pose where the probe stands as a reference point, when lift-off shows there."""
+        scan, target = self._scan, self._scan.targets[index]
+        at_start, noise = self._read()
+        lifted_target = with_z(target, float(target[2]) + LIFT_MM)
+        scan.stage.move(lifted_target, scan.technique.scan.approach_speed_mm_s)
         lifted, _ = self._read()
-        change = abs(lifted - self.at_start)
-        self.ohm_per_mm = change / LIFT_MM
-        self.works = change > LEAST_CONTRAST * noise and change > 0
         scan.at = None
+        change = abs(lifted - at_start)
+        works = change > LEAST_CONTRAST * noise and change > 0
+        if works:
+            self._references.append(_Reference(index, at_start, change / LIFT_MM))
         scan.sink.note(
             "event",
             {
-                "event": "reference point"
-                if self.works
-                else "reference point tells nothing: no contrast with lift-off",
-                "pose": self._index,
-                "impedance_ohm": [self.at_start.real, self.at_start.imag],
-                "ohm_per_mm": self.ohm_per_mm,
+                "event": "reference point" if works else "reference point tells nothing: no contrast with lift-off",
+                "pose": index,
+                "impedance_ohm": [at_start.real, at_start.imag],
+                "ohm_per_mm": change / LIFT_MM,
             },
         )
 
     def look(self) -> None:
-        """Read the reference point again.
+        """Read the nearest reference point again.
 
         Raises
         ------
         ScanAborted
             When the reading changed by more than the technique's `watch_limit_mm` of lift-off.
         """
-        if not self.works:
+        if not self._references:
             return
         scan, limit = self._scan, self._scan.technique.scan.watch_limit_mm
-        hop(scan, scan.targets[self._index])
+        here = scan.stage.position()[:2]
+        chosen = min(self._references, key=lambda r: float(np.linalg.norm(scan.targets[r.index][:2] - here)))
+        hop(scan, scan.targets[chosen.index])
         now, _ = self._read()
         scan.at = None
-        shift = abs(now - self.at_start) / self.ohm_per_mm
-        scan.sink.note("event", {"event": "reference point again", "change_mm": shift})
+        shift = abs(now - chosen.at_start) / chosen.ohm_per_mm
+        scan.sink.note("event", {"event": "reference point again", "pose": chosen.index, "change_mm": shift})
         if shift > limit:
             raise ScanAborted(
-                f"the part moved: at the reference point (row {scan.plan.row[self._index]}, point "
-                f"{scan.plan.point[self._index]}) the reading changed as by {shift:.2f} mm of lift-off (limit "
+                f"the part moved: at the reference point (row {scan.plan.row[chosen.index]}, point "
+                f"{scan.plan.point[chosen.index]}) the reading changed as by {shift:.2f} mm of lift-off (limit "
                 f"{limit:g}). Readings since the last good look are doubtful. Clamp the part, align it again, "
                 "scan into a new record."
             )

@@ -41,6 +41,8 @@ def watch_part(scan: Scan, row: int | None) -> None:
     elif row is None or scan.rows_since_watch >= every:
         scan.watch.look()
         scan.rows_since_watch = 0
+    elif scan.watch.references == 1 and scan.at is not None:
+        scan.watch.add(scan.at)
     scan.rows_since_watch += 1
     scan.row = row
 
