@@ -47,7 +47,7 @@ def draw_cases(campaign: Campaign, known: set[str]) -> dict[str, Column]:
 def case_seeds(campaign: Campaign, n: int) -> list[int]:
     """Return one independent seed per case, tied to the case's number."""
     states = np.random.SeedSequence(campaign.campaign.seed, spawn_key=(1,)).generate_state(n, np.uint64)
-    return [int(state) for state in states]
+    return [int(state >> np.uint64(1)) for state in states]  # 63 bits: the widest integer of a Parquet column
 
 
 def _check_names(vary: dict[str, Variation], known: set[str]) -> None:
