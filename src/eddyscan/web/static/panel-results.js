@@ -98,8 +98,6 @@ export class Results {
   }
 
   markers() {
-    const spots = this.called.flatMap((one) => one.centre_mm);
-    this.viewer.setPoints("called", new Float32Array(spots), [255, 255, 255], { px: 13, lift: 0.006 });
     const here = this.one ? ring(this.one.centre_mm, Math.max(4, this.one.extent_mm / 2 + 2)) : [];
     this.viewer.setSegments("here", new Float32Array(here), [255, 70, 160], { px: 4, lift: 0.008 });
   }

@@ -62,6 +62,8 @@ export class Picture {
       if (stamp) await this.fetch(scene);
       else this.forget(scene);
     }
+    const spots = this.app.overview.indications.flatMap((one) => one.centre_mm);
+    this.viewer.setPoints("called", new Float32Array(spots), [255, 255, 255], { px: 13, lift: 0.006 });
     this.show(this.bench.step);
   }
 
@@ -236,6 +238,7 @@ export class Picture {
 
 export function channelTitle(name) {
   const unit = name.endsWith("_ohm") ? "Ω" : name.endsWith("_mm") ? "mm" : "";
+  if (name === "score") return "Score: residual over its noise";
   const words = name.replace(/_(ohm|mm)$/, "").replaceAll("_", " ");
   return `${words[0].toUpperCase()}${words.slice(1)}${unit ? ` [${unit}]` : ""}`;
 }
