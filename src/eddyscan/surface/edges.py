@@ -20,12 +20,9 @@ from eddyscan.surface.view import View
 
 REACH_MM = 4.0
 STEP_MM = 0.2
-SMOOTH_MM = 4.0
 NEARER_MM = 2.5  # a fattened pixel carries the depth of a neighbour up to 3 px away
 FARTHER_MM = 0.6  # a wall's pixel soon lies deeper than the extrapolated top
 INSIDE_SHARE, OUTSIDE_SHARE = 0.75, 0.35
-NOISE_MM = 0.5
-CORRELATION_MM = 10.0
 
 Height = Callable[[Array], Array]
 
@@ -48,7 +45,13 @@ class EdgeOffsets:
 
 
 def measure_edges(
-    views: Sequence[View], T_box_world: Array, contour: Array, normal: Array, height: Height
+    views: Sequence[View],
+    T_box_world: Array,
+    contour: Array,
+    normal: Array,
+    height: Height,
+    *,
+    pool_mm: float,
 ) -> EdgeOffsets:
     """Find the edge along every contour sample in every view.
 
@@ -58,13 +61,16 @@ def measure_edges(
     T_box_world : (4, 4) to the frame of `contour`
     contour, normal : (S, 2) evenly spaced closed contour [mm] and its outward unit normals
     height : function (N, 2) -> (N,) [mm], the top surface, extrapolated a little beyond its edge
+    pool_mm : float
+        Length along the contour over which pixels are pooled. Fattening comes in patches: over too short a
+        length a patch looks like the edge.
     """
     across = np.arange(-REACH_MM, REACH_MM + STEP_MM / 2, STEP_MM)
     xy = contour[:, None] + across[None, :, None] * normal[:, None]
     z = height(xy.reshape(-1, 2))
     points = np.concatenate([xy.reshape(-1, 2), z[:, None]], axis=1)
     spacing = float(np.linalg.norm(np.diff(contour, axis=0), axis=1).mean())
-    sigma = SMOOTH_MM / spacing
+    sigma = pool_mm / spacing
     offsets = []
     for view in views:
         on_top, looked = (layer.reshape(xy.shape[:2]) for layer in _on_top(view, T_box_world, points))
@@ -101,11 +107,3 @@ def _step_position(share: Array, known: Array, across: Array) -> Array:
     clear = (inner > INSIDE_SHARE) & (outer < OUTSIDE_SHARE) & (known.min(axis=1) > 0.9)
     clear &= (best > 3) & (best < len(across) - 4)
     return np.where(clear, position, np.nan)
-
-
-def common_edge(edges: EdgeOffsets) -> tuple[Array, Array]:
-    """Return the views' mean offset per contour sample (S,) [mm] and how many views saw it (S,)."""
-    seen = np.isfinite(edges.offset_mm)
-    count = seen.sum(axis=0)
-    total = np.where(seen, edges.offset_mm, 0.0).sum(axis=0)
-    return np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0), count

@@ -22,7 +22,8 @@ from eddyscan.surface.refine import LEVER_MM
 from eddyscan.surface.sides import straightened
 from eddyscan.surface.view import View
 
-PASSES = 2
+POOL_MM = (5.0, 12.0, 12.0)  # one per pass: coarse first, then over lengths that outvote a patch
+TRUST_MM = 2.0  # after the first pass the border is no farther away than this
 POINT_TO_PLANE_INFLATION = 60.0  # neighbouring pixels share their noise: this many count as one
 EDGE_NOISE_MM = 0.25
 EDGE_CORRELATION_MM = 10.0
@@ -72,8 +73,8 @@ def sharpen(
     current = list(views)
     outline, seen = part.outline, 0.0
     total = information
-    for _ in range(PASSES):
-        border = _measure(current, part, outline, height)
+    for pool_mm in POOL_MM:
+        border = _measure(current, part, outline, height, pool_mm)
         seen = float(np.isfinite(border.offset).any(axis=0).mean())
         if seen < CLEAR_SHARE:
             break
@@ -81,7 +82,7 @@ def sharpen(
             twists, shifted, total = _pose_correction(border, part, information, centre, reference)
             current = [_moved(v, twists[k], centre) for k, v in enumerate(current)]
             border = replace(border, offset=shifted)
-        outline = _placed(border, outline)
+        outline = _placed(border)
     points = np.concatenate([v.points_in(part.T_part_world, *part.box(0.0))[0] for v in current])
     axes = align(outline, points)
     frame = PartFrame(
@@ -93,10 +94,10 @@ def sharpen(
     return Sharpened(tuple(current), frame, total, seen)
 
 
-def _measure(views: Sequence[View], part: PartFrame, outline: Outline, height: Height) -> _Border:
+def _measure(views: Sequence[View], part: PartFrame, outline: Outline, height: Height, pool_mm: float) -> _Border:
     contour = even_spacing(outline.polygon, 1.0)
     normal = outward(contour)
-    edges = measure_edges(views, part.T_part_world, contour, normal, height)
+    edges = measure_edges(views, part.T_part_world, contour, normal, height, pool_mm=pool_mm)
     rim = np.concatenate([contour, height(contour)[:, None]], axis=1)
     offset = edges.offset_mm.copy()
     low, high = part.box(6.0)
@@ -184,8 +185,9 @@ def _moved(view: View, twist: Array, centre: Array) -> View:
     return replace(view, T_world_camera=small @ view.T_world_camera)
 
 
-def _placed(border: _Border, outline: Outline) -> Outline:
-    weight = _weights(border.offset)
+def _placed(border: _Border) -> Outline:
+    trust = np.clip(1 - (np.nan_to_num(border.offset) / TRUST_MM) ** 2, 0.05, None)
+    weight = _weights(border.offset) * trust
     total = weight.sum(axis=0)
     known = total > 0
     value = np.where(weight > 0, border.offset, 0.0)
@@ -193,5 +195,4 @@ def _placed(border: _Border, outline: Outline) -> Outline:
     index = np.arange(len(mean))
     mean = np.interp(index, index[known], mean[known], period=len(mean))
     polygon, directions, lengths = straightened(border.contour + border.normal * mean[:, None], known)
-    del outline
     return Outline(polygon, float(known.mean()), directions, lengths)

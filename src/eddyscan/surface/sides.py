@@ -24,6 +24,7 @@ SIDE_MIN_MM = 25.0
 TRIM_MM = 8.0  # the contour is rounded this near a corner
 WAVE_MM = 8.0  # a fit's residual is judged after smoothing over this length
 FIT_LIMIT_MM = 0.3
+FIT_SHARE = 0.75  # of the side must follow the fit; the rest may be bites, burrs or the camera's patches
 DEGREES = (1, 2, 4, 6)
 UNKNOWN_WEIGHT = 0.1
 
@@ -82,7 +83,7 @@ def straightened(
     corners = cv2.approxPolyDP(loop.astype(np.float32)[:, None], ROUGH_CORNER_MM if rough else CORNER_MM, True)[:, 0]
     starts = sorted({int(np.argmin(np.linalg.norm(loop - c, axis=1))) for c in corners})
     runs = [np.arange(a, b + 1) % len(loop) for a, b in pairwise([*starts, starts[0] + len(loop)])]
-    sides = [_fitted(loop[r], known[r], spacing_mm, 0.75 if rough else 0.9) for r in runs]
+    sides = [_fitted(loop[r], known[r], spacing_mm) for r in runs]
     smooth = gaussian_filter1d(loop, 4.0 / spacing_mm, axis=0, mode="wrap")
     pieces = [_piece(sides[k - 1], sides[k], sides[(k + 1) % len(sides)], smooth[r]) for k, r in enumerate(runs)]
     straight = [s for s in sides if s is not None and s.straight]
@@ -90,7 +91,7 @@ def straightened(
     return _without_repeats(np.concatenate(pieces)), np.array(directions), np.array([s.length_mm for s in straight])
 
 
-def _fitted(points: Array, known: NDArray[np.bool_], spacing_mm: float, share: float) -> _Side | None:
+def _fitted(points: Array, known: NDArray[np.bool_], spacing_mm: float) -> _Side | None:
     """Return the simplest robust fit of a run, or None when it is short or follows no smooth curve."""
     chord = points[-1] - points[0]
     length = float(np.linalg.norm(chord))
@@ -105,7 +106,7 @@ def _fitted(points: Array, known: NDArray[np.bool_], spacing_mm: float, share: f
     for degree in DEGREES:
         curve = _robust_polynomial(t[middle], o[middle], base, degree)
         wave = gaussian_filter1d(np.clip(o[middle] - curve(t[middle]), -1.0, 1.0), WAVE_MM / spacing_mm, mode="nearest")
-        if np.quantile(np.abs(wave), share) < FIT_LIMIT_MM:
+        if np.quantile(np.abs(wave), FIT_SHARE) < FIT_LIMIT_MM:
             return _Side(points[0], along, across, length, curve)
     return None
 
