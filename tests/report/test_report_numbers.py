@@ -6,6 +6,7 @@ import base64
 import dataclasses
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -27,7 +28,9 @@ from eddyscan.core.frames import Array
 from eddyscan.core.indication import Indication
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.parts import named_part
+from eddyscan.report.blocks import Chart
 from eddyscan.report.content import NominalComparison
+from eddyscan.report.envelopes import MOST_POINTS, envelope, sparse
 from eddyscan.report.figures_coverage import examined_share, share_texts, vertex_areas
 from eddyscan.report.figures_indication import lift_off_rotation, neighbourhood
 from eddyscan.report.figures_position import axis_errors, longest_row
@@ -37,7 +40,9 @@ from eddyscan.report.figures_views import view_picture
 from eddyscan.report.headline import headline
 from eddyscan.report.mesh_thinning import on_border, thinned
 from eddyscan.report.scene import scene_json
+from eddyscan.report.sections import sections
 from eddyscan.report.sections_result import false_call_basis, indication_table, reference_amplitude
+from eddyscan.report.theme import VARIABLES, to_svg
 from eddyscan.report.words import flattened, label, number, percent, plus_minus
 
 
@@ -241,7 +246,7 @@ def test_amplitudes_are_stated_against_the_reference_notch() -> None:
     reference = reference_amplitude([{"when": "warm-up"}, {"amplitude_mohm": 80.0, "notch_depth_mm": 0.5}])
     assert reference == (pytest.approx(0.08), "the 0.5 mm reference notch")
     table = indication_table([one], reference)
-    assert dict(zip(table.columns, table.rows[0], strict=True))["re notch [dB]"] == "-6.0"
+    assert dict(zip(table.columns, table.rows[0], strict=True))["re notch [dB]"] == "−6.0"
     assert "dB re the 0.5 mm reference notch" in table.title
     plain = indication_table([one])
     assert "re notch [dB]" not in plain.columns
@@ -285,3 +290,40 @@ def test_names_become_words_with_units() -> None:
     ]
     assert plus_minus(1.234, 0.05) == "1.23 ± 0.05"
     assert plus_minus(None, None) == "–"
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=300), st.integers(1, 40))
+def test_an_envelope_keeps_every_extreme(values: list[float], bins: int) -> None:
+    y: Array = np.array(values)
+    x, low, high = envelope(np.arange(float(len(y))), y, bins)
+    assert len(x) <= bins
+    assert low.min() == y.min()
+    assert high.max() == y.max()
+    assert (low <= high).all()
+
+
+def test_an_envelope_of_nothing_is_empty() -> None:
+    assert all(len(part) == 0 for part in envelope(np.zeros(2), np.full(2, np.nan)))
+
+
+def test_sparse_keeps_no_more_than_it_may() -> None:
+    for count in (0, 1, 2999, 3000, 3001, 71225):
+        assert len(range(count)[sparse(count)]) <= 3000
+
+
+def test_no_picture_inside_a_drawing_holds_a_stand_in_colour() -> None:
+    """A rasterised line would keep the stand-in for its colour and come out black."""
+    content = whole_inspection(pitch_mm=2.0, step_mm=1.0, edge_mm=4.0)
+    assert content.record is not None
+    assert len(content.record) > MOST_POINTS
+    stand_ins = {tuple(int(c[k : k + 2], 16) for k in (1, 3, 5)) for c in VARIABLES}
+    charts = [b for chapter in sections(content) for b in chapter.blocks if isinstance(b, Chart)]
+    pictures = 0
+    for chart in charts:
+        for data in re.findall(r'href="data:image/png;base64,([^"]+)"', to_svg(chart.draw, chart.caption)):
+            pixels = (255 * imread(io.BytesIO(base64.b64decode(data)))).round().astype(int)
+            solid = pixels[pixels[..., 3] == 255][:, :3]
+            assert not stand_ins & set(map(tuple, np.unique(solid, axis=0).tolist())), chart.caption
+            pictures += 1
+    assert pictures >= 6

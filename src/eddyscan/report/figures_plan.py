@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.plan import ScanPlan
+from eddyscan.report.envelopes import MOST_POINTS, sparse
 from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes, map_height_in
 
 if TYPE_CHECKING:
@@ -22,14 +24,14 @@ def path_figure(plan: ScanPlan, mesh: SurfaceMesh | None, theme: Theme) -> Figur
         _contours(axes, mesh, theme)
     spots = plan.surface_mm
     scan = plan.is_scan
+    few = spots[sparse(len(spots))]
     axes.plot(
-        spots[:, 0],
-        spots[:, 1],
+        few[:, 0],
+        few[:, 1],
         color=theme.muted,
         lw=0.5,
         ls=":",
         label="links and approaches",
-        rasterized=len(plan) > 5000,
     )
     drawn = axes.scatter(
         spots[scan, 0],
@@ -79,21 +81,33 @@ def point_size(points: int) -> float:
 
 
 def predicted_figure(plan: ScanPlan, target_mm: float, theme: Theme) -> Figure:
-    """Draw predicted lift-off and tilt of every reading in visiting order."""
+    """Draw predicted lift-off and tilt: of every reading, or of every row when there are many."""
     figure, (lift, tilt) = canvas(height_in=3.9, rows=2, sharex=True)
     scan = plan.is_scan
-    order = np.arange(plan.n_scan)
-    for axes in (lift, tilt):
-        for k in np.flatnonzero(np.diff(plan.row[scan])):
-            axes.axvline(k + 0.5, color=theme.rule, lw=0.5, zorder=0)
+    by_row = plan.n_scan > MOST_POINTS
+    for axes, values in ((lift, plan.lift_off_mm[scan]), (tilt, plan.tilt_deg[scan])):
+        if by_row:
+            _rows(axes, plan.row[scan], values, theme)
+        else:
+            axes.plot(np.arange(plan.n_scan), values, color=theme.second, lw=1)
+            for k in np.flatnonzero(np.diff(plan.row[scan])):
+                axes.axvline(k + 0.5, color=theme.rule, lw=0.5, zorder=0)
         axes.grid(axis="x", visible=False)
-    lift.plot(order, plan.lift_off_mm[scan], color=theme.second, lw=1)
     lift.axhline(target_mm, color=theme.accent, lw=1, ls="--", label=f"asked for: {target_mm:g} mm")
     lift.set_ylabel("lift-off [mm]")
-    lift.set_title("Predicted lift-off and tilt of every reading (vertical lines part the rows)")
+    what = "row (band: least to largest, line: mean)" if by_row else "reading (vertical lines part the rows)"
+    lift.set_title(f"Predicted lift-off and tilt of every {what}")
     lift.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
-    tilt.plot(order, plan.tilt_deg[scan], color=theme.second, lw=1)
     tilt.set_ylabel("tilt [°]")
-    tilt.set_xlabel("reading, in visiting order")
+    tilt.set_xlabel("row" if by_row else "reading, in visiting order")
     tilt.set_ylim(bottom=0)
     return figure
+
+
+def _rows(axes: Axes, row: IntArray, values: Array, theme: Theme) -> None:
+    """Draw least, mean and largest value of every row."""
+    order = np.argsort(row, kind="stable")
+    rows, starts, counts = np.unique(row[order], return_index=True, return_counts=True)
+    low, high = np.minimum.reduceat(values[order], starts), np.maximum.reduceat(values[order], starts)
+    axes.fill_between(rows, low, high, color=theme.second, alpha=0.25, lw=0)
+    axes.plot(rows, np.add.reduceat(values[order], starts) / counts, color=theme.second, lw=1.2)

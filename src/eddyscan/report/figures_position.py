@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eddyscan.core.record import ScanRecord
+from eddyscan.report.envelopes import sparse
 from eddyscan.report.theme import Theme, canvas
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = ("x", "y", "z")
+MOST_MARKS = 1500
 
 
 @dataclass(frozen=True)
@@ -50,33 +52,17 @@ def position_figure(record: ScanRecord, theme: Theme) -> Figure:
     """Draw planned and recorded positions of one row in x and z, and of the whole scan in x and y."""
     figure, (side, above) = canvas(height_in=3.0, columns=2)
     row = longest_row(record)
-    one = record.row == row
-    for axes, chosen, (i, j) in ((side, one, (0, 2)), (above, np.ones(len(record), bool), (0, 1))):
-        heavy = int(chosen.sum()) > 2000
-        axes.plot(
-            record.target_mm[chosen, i],
-            record.target_mm[chosen, j],
-            "o",
-            mfc="none",
-            mec=theme.accent,
-            ms=4.5,
-            mew=0.9,
-            label="planned",
-            rasterized=heavy,
-        )
-        axes.plot(
-            record.stage_mm[chosen, i],
-            record.stage_mm[chosen, j],
-            ".",
-            color=theme.second,
-            ms=2.6,
-            label="recorded",
-            rasterized=heavy,
-        )
+    every = np.arange(len(record))
+    shown = every[sparse(len(record), MOST_MARKS)]
+    for axes, chosen, (i, j) in ((side, every[record.row == row], (0, 2)), (above, shown, (0, 1))):
+        planned, recorded = record.target_mm[chosen], record.stage_mm[chosen]
+        axes.plot(planned[:, i], planned[:, j], "o", mfc="none", mec=theme.accent, ms=4.5, mew=0.9, label="planned")
+        axes.plot(recorded[:, i], recorded[:, j], ".", color=theme.second, ms=2.6, label="recorded")
         axes.set_xlabel(f"{AXES[i]} stage [mm]")
         axes.set_ylabel(f"{AXES[j]} stage [mm]")
     side.set_title(f"Row {row}: x and z")
-    above.set_title("Whole scan: x and y")
+    step = len(record) // len(shown)
+    above.set_title("Whole scan: x and y" + (f", every {step}th reading" if step > 1 else ""))
     side.legend(loc="best")
     return figure
 

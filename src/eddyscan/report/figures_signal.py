@@ -9,6 +9,7 @@ import numpy as np
 from eddyscan.core.cscan import CScan
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.core.record import ScanRecord
+from eddyscan.report.envelopes import line
 from eddyscan.report.figures_plan import point_size
 from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes, map_height_in
 from eddyscan.report.words import label
@@ -155,7 +156,7 @@ def strip_figure(record: ScanRecord, residual_ohm: ComplexArray | None, theme: T
         strips["residual [mΩ]"] = 1000 * np.abs(residual_ohm)
     figure, panels = canvas(height_in=0.7 + 1.1 * len(strips), rows=len(strips), sharex=True)
     for panel, (title, values) in zip(panels, strips.items(), strict=True):
-        panel.plot(record.time_s, values, color=theme.second, lw=0.7, rasterized=len(values) > 3000)
+        line(panel, record.time_s, values, theme.second, 0.7)
         panel.set_ylabel(title)
     panels[0].set_title("Strip chart, as read")
     panels[-1].set_xlabel("time since the scan began [s]")

@@ -9,6 +9,7 @@ import numpy as np
 from eddyscan.core.frames import Array
 from eddyscan.core.mesh import face_vectors
 from eddyscan.report.content import ReportContent
+from eddyscan.report.envelopes import sparse
 from eddyscan.report.mesh_thinning import thinned
 from eddyscan.report.theme import Theme, canvas
 
@@ -49,8 +50,9 @@ def still_figure(content: ReportContent, theme: Theme) -> Figure:
         PolyCollection(list(flat[faces]), facecolors=colour, edgecolors=colour, lw=0.3, rasterized=True)
     )
     if content.plan is not None:
-        line, _ = projected(content.plan.T_part_probe[content.plan.is_scan, :3, 3])
-        axes.plot(line[:, 0], line[:, 1], color=theme.second, lw=0.5, rasterized=len(line) > 3000)
+        scan = content.plan.T_part_probe[content.plan.is_scan, :3, 3]
+        line, _ = projected(scan[sparse(len(scan))])
+        axes.plot(line[:, 0], line[:, 1], color=theme.second, lw=0.5)
     axes.autoscale_view()
     axes.set_aspect("equal")
     axes.set_axis_off()

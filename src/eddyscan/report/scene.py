@@ -17,6 +17,7 @@ from eddyscan.report.words import label
 
 MOST_VERTICES = 30_000
 MOST_PATH_POINTS = 20_000
+MOST_ROWS = 40  # more would hide the surface: the reader shows them by a click on the legend
 GREY, GREY_SHARE = "#8a949d", 0.02
 
 
@@ -129,6 +130,7 @@ def _path(content: ReportContent) -> list[dict[str, Any]]:
             **axes,
             "line": line,
             "hoverinfo": "skip",
+            "visible": True if content.plan.n_rows <= MOST_ROWS else "legendonly",
         }
     ]
 

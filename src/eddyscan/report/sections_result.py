@@ -165,7 +165,11 @@ def indication_table(found: Sequence[Indication], reference: tuple[float, str] |
             f"{one.extent_mm:.1f}",
             f"{one.angle_deg:.0f}",
             number(1000 * one.amplitude_ohm),
-            *([] if reference is None else [f"{20 * math.log10(one.amplitude_ohm / reference[0]):+.1f}"]),
+            *(
+                []
+                if reference is None
+                else [f"{20 * math.log10(one.amplitude_ohm / reference[0]):+.1f}".replace("-", "−")]
+            ),
             f"{one.phase_deg:.0f}",
             f"{one.snr:.1f}",
             plus_minus(one.length_mm, one.length_uncertainty_mm),

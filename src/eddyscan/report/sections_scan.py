@@ -84,7 +84,7 @@ def alignment(content: ReportContent) -> Section | None:
 
 def _pose_table(meta: Mapping[str, Any]) -> Table:
     """Return T_stage_part as a table an auditor can type in again."""
-    rows = tuple(tuple(f"{value:.6f}" for value in row) for row in meta["T_stage_part"])
+    rows = tuple(tuple(f"{value:.6f}".replace("-", "−") for value in row) for row in meta["T_stage_part"])
     title = "Pose of the part on the stage: T_stage_part [rotation, mm]"
     return Table(("x part", "y part", "z part", "origin [mm]"), rows, title, frozenset())
 

@@ -13,7 +13,7 @@ from eddyscan.report.content import NominalComparison, ReportContent
 from eddyscan.report.figures_still import still_figure
 from eddyscan.report.figures_surface import deviation_figure, profile_figure, uncertainty_figure
 from eddyscan.report.figures_views import view_picture
-from eddyscan.report.scene import scene_json
+from eddyscan.report.scene import MOST_ROWS, scene_json
 from eddyscan.report.tables import facts_of
 from eddyscan.report.words import number
 
@@ -55,6 +55,8 @@ def surface(content: ReportContent) -> Section:
     )
     still = Chart(partial(still_figure, content), "The surface seen from the front, with the planned path.")
     caption = "Drag to turn, scroll to zoom. The menu changes what the colour shows; grey: not covered."
+    if content.plan is not None and content.plan.n_rows > MOST_ROWS:
+        caption += " The path is dense: click its name to show it."
     blocks: list[Block] = [Scene(scene_json(content), caption, still)]
     if mesh.uncertainty_mm is not None:
         blocks.append(
