@@ -39,6 +39,14 @@ def test_the_answer_has_the_contracts_form():
     assert json.loads(json.dumps(answer)) == answer
 
 
+def test_what_lies_beyond_validation_is_told():
+    assert solve_case(parse_case(CASE))["warnings"] == []
+    (told,) = solve_case(parse_case(changed(drive={"frequency_hz": 20e3})))["warnings"]
+    assert "opening_mm = 0.28 is 0.44 skin depths (0.643 mm); the model is validated up to 0.25" in told
+    (told,) = solve_case(parse_case(changed(conductor={"thickness_mm": 5.2})))["warnings"]
+    assert "depth_mm = 5 leaves 0.2 mm under the slot" in told
+
+
 def test_a_sound_half_space_needs_no_slot_and_no_positions():
     answer = solve_case(parse_case(changed(slot=None, conductor={"thickness_mm": None}, scan={"lift_off_mm": 1.0})))
     assert answer["slot"] == []

@@ -18,7 +18,7 @@ from eddyscan.physics import checks
 from eddyscan.physics.coil import Coil, air_inductance_h
 from eddyscan.physics.conductor import Conductor
 from eddyscan.physics.impedance import impedance_ohm
-from eddyscan.physics.slot import Profile, Slot
+from eddyscan.physics.slot import Profile, Slot, slot_warnings
 from eddyscan.physics.slot_solver import slot_change_ohm
 
 
@@ -181,7 +181,7 @@ def read_case(path: Path) -> SignalCase:
 
 
 def solve_case(case: SignalCase) -> dict[str, Any]:
-    """Return air, sound and slot signals of a case in the contract's JSON form."""
+    """Return air, sound and slot signals of a case in the contract's JSON form, with what lies beyond validation."""
     coil, frequency = case.physical_coil, case.drive.frequency_hz
     omega = 2 * np.pi * frequency
     sound = complex(impedance_ohm(coil, case.physical_conductor, frequency, case.scan.lift_off_mm))
@@ -195,15 +195,31 @@ def solve_case(case: SignalCase) -> dict[str, Any]:
         "air": {"resistance_ohm": 0.0, "inductance_h": air_inductance_h(coil)},
         "sound": {"resistance_ohm": sound.real, "inductance_h": sound.imag / omega},
         "slot": rows if case.slot is not None else [],
+        "warnings": list(case_warnings(case)),
     }
+
+
+def case_slot(case: SignalCase) -> Slot | None:
+    """Return the slot of a case, None for a sound conductor."""
+    if case.slot is None:
+        return None
+    return Slot(case.slot.length_mm, case.slot.depth_mm, case.slot.opening_mm, case.slot.profile)
+
+
+def case_warnings(case: SignalCase) -> tuple[str, ...]:
+    """Return what of a case lies beyond the validated range, in words."""
+    slot = case_slot(case)
+    if slot is None:
+        return ()
+    return slot_warnings(slot, case.physical_conductor, case.drive.frequency_hz)
 
 
 def slot_signal_ohm(case: SignalCase) -> ComplexArray:
     """Return the slot's change of impedance at every position of the case (N,) [ohm]; zero without a slot."""
     x_mm, y_mm = case.scan.positions_mm
-    if case.slot is None:
+    slot = case_slot(case)
+    if slot is None:
         return np.zeros(x_mm.shape, dtype=np.complex128)
-    slot = Slot(case.slot.length_mm, case.slot.depth_mm, case.slot.opening_mm, case.slot.profile)
     return slot_change_ohm(
         slot,
         case.physical_coil,

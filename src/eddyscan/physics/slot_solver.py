@@ -30,7 +30,7 @@ from eddyscan.physics.slot_field import CoilOnSlot, Drive
 from eddyscan.physics.slot_rectangle import RectangleBasis
 
 DEEPEST_SKIN_DEPTHS = 8.0
-MOST_ALONG = 64
+MOST_ALONG = 96
 MOST_DEGREE = 40
 
 
@@ -150,9 +150,9 @@ def slot_basis(slot: Slot, metal: SlottedMetal, detail_m: float, functions: tupl
     TechniqueError
         The slot needs more functions along its length than the solver takes.
     """
-    along = 16 + int(1.9 * slot.half_length_m / detail_m)
+    along = 18 + int(1.9 * slot.half_length_m / detail_m)
     if along > MOST_ALONG and functions is None:
-        longest = (MOST_ALONG - 16) / 1.9 * 2 * detail_m / MM
+        longest = (MOST_ALONG - 18) / 1.9 * 2 * detail_m / MM
         raise TechniqueError(
             f"length_mm = {slot.length_mm:g}: must be at most {longest:.3g} mm for a coil of mean radius "
             f"{detail_m / MM:g} mm. Cut the slot to the stretch the coil passes."
@@ -167,7 +167,7 @@ def slot_basis(slot: Slot, metal: SlottedMetal, detail_m: float, functions: tupl
             )
         return EllipseBasis(slot.half_length_m, slot.depth_m, degree)
     depth = min(slot.depth_m, DEEPEST_SKIN_DEPTHS * metal.skin_m)
-    along, down = functions or (along, 11 + int(depth / metal.skin_m))
+    along, down = functions or (along, 13 + int(depth / metal.skin_m))
     return RectangleBasis(slot.half_length_m, depth, along, down)
 
 

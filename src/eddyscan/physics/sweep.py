@@ -9,11 +9,10 @@ import numpy as np
 from eddyscan.core.errors import TechniqueError
 from eddyscan.core.frames import Array, ComplexArray
 from eddyscan.core.progress import Progress, silent
-from eddyscan.physics.case import SignalCase
+from eddyscan.physics.case import SignalCase, case_slot
 from eddyscan.physics.coil import Coil, air_inductance_h
 from eddyscan.physics.conductor import Conductor, skin_depth_mm
 from eddyscan.physics.impedance import impedance_change_ohm
-from eddyscan.physics.slot import Slot
 from eddyscan.physics.slot_solver import SlotSolver
 
 Over = Literal["frequency", "lift-off"]
@@ -98,10 +97,9 @@ def _slot_peak_ohm(
     case: SignalCase, coil: Coil, conductor: Conductor, frequency_hz: float, lift_off_mm: Array
 ) -> ComplexArray | None:
     """Return the strongest slot signal over the case's positions, per lift-off (H,); None without a slot."""
-    if case.slot is None:
+    slot = case_slot(case)
+    if slot is None:
         return None
-    shape = case.slot
-    slot = Slot(shape.length_mm, shape.depth_mm, shape.opening_mm, shape.profile)
     detail = 0.5 * (coil.inner_radius_mm + coil.outer_radius_mm)
     x_mm, y_mm = case.scan.positions_mm
     signals = SlotSolver(slot, conductor, frequency_hz, detail_mm=detail).change_ohm(coil, x_mm, y_mm, lift_off_mm)
