@@ -16,8 +16,28 @@ Scheduler = typer.Option(None, "--scheduler", help="A Dask cluster instead: tcp:
 
 def register(app: typer.Typer) -> None:
     """Add this module's commands."""
+    app.command()(campaign)
     app.command()(batch)
     app.command()(validate)
+
+
+def campaign(
+    file: Path = typer.Argument(..., help="What varies over a base technique.", metavar="CAMPAIGN.toml"),
+    out: Path = typer.Option(..., "--out", help="Folder for the rows; an interrupted campaign goes on.", metavar="DIR"),
+    workers: int = Workers,
+    scheduler: str | None = Scheduler,
+    json: bool = Json,
+) -> None:
+    """Run virtual inspections by the hundred or thousand: probability of detection, choice of probe and pitch."""
+    from eddyscan.campaign.results import result_rows, summarise
+    from eddyscan.campaign.run import run_campaign
+
+    with progress_bars() as progress:
+        rows = run_campaign(file, out, workers=workers, scheduler=scheduler, progress=progress, say=say)
+    summary = summarise(rows, out)
+    table(f"campaign {file} (simulation)", ["quantity", "value"], result_rows(summary))
+    if json:
+        emit_json(summary)
 
 
 def batch(
