@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,7 @@ def technique(mode: str) -> Technique:
     return base.model_copy(update={"plan": plan, "scan": base.scan.model_copy(update={"mode": mode})})
 
 
+@lru_cache(maxsize=1)
 def coarse_plan() -> ScanPlan:
     return make_plan(named_part(PART).top_mesh(2.0), technique("step"))
 

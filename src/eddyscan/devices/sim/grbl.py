@@ -96,6 +96,8 @@ class GrblSimulator:
     def close(self) -> None:
         """Stop listening and drop every connection."""
         if self._server is not None:
+            with contextlib.suppress(OSError):
+                self._server.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
             self._server.close()
         self.drop_link()
 

@@ -106,6 +106,8 @@ class ZaberSimulator:
         """Stop listening and drop every connection."""
         self._closing.set()
         if self._server is not None:
+            with contextlib.suppress(OSError):
+                self._server.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
             self._server.close()
         self._drop_link()
 
