@@ -9,7 +9,7 @@ import numpy as np
 from eddyscan.core.frames import Array
 from eddyscan.planning.levels import Line
 
-GOOD_OF_STEP = 0.02
+GOOD_OF_STEP = 0.025
 MOVE_OF_PITCH = 0.045
 # Round a pole the smallest row is a square: three points would leave its sides uncovered.
 FEWEST, POLE_STEPS, POLE_MOVE_OF_PITCH = 4, 5, 0.25

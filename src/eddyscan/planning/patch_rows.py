@@ -104,7 +104,7 @@ class _Laying:
 
     def _strokes(self, lines: list[Line]) -> tuple[list[Stroke], Array]:
         """Return the readable parts of the lines' strokes, and the spots (K, 3) the probe cannot read."""
-        made = [stroke_from_line(line, self.surface, self.technique.plan.step_mm) for line in lines]
+        made = [stroke_from_line(line, self.surface, self.technique.plan) for line in lines]
         strokes = [stroke for stroke in made if stroke is not None]
         if not strokes:
             return [], np.empty((0, 3))

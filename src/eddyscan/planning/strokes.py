@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from eddyscan.core.frames import Array, BoolArray
+from eddyscan.core.technique import Plan
 from eddyscan.planning.levels import Line
 from eddyscan.planning.loops import steps_in_loop
 from eddyscan.planning.smooth import SmoothSurface
@@ -15,6 +17,9 @@ TRIM_OF_STEP = 0.05
 SPACING_OF_STEP = 0.008
 # Pieces shorter than this are read once, in their middle.
 ONE_POINT_OF_STEP = 0.5
+SPECK_OF_STEP = 0.02
+# How far an adaptive step may shrink or grow.
+SHORTEST_OF_STEP, LONGEST_OF_STEP = 0.25, 2.0
 
 
 @dataclass(frozen=True)
@@ -52,18 +57,22 @@ def surface_distance(p: Array, q: Array, n_p: Array, n_q: Array) -> Array:
     return np.asarray(chord * np.where(half > 1e-6, half / np.maximum(np.sin(half), 1e-12), 1.0))
 
 
-def stroke_from_line(line: Line, surface: SmoothSurface, step_mm: float) -> Stroke | None:
-    """Return readings every `step_mm` of arc length along a line, or None when it is a mere speck.
+def stroke_from_line(line: Line, surface: SmoothSurface, settings: Plan) -> Stroke | None:
+    """Return readings along a line, or None when it is a mere speck.
 
-    The remainder is spread: the step becomes length / round(length / step). Up
-    to 5 % of a step is left at each end when that brings the steps closer to
-    what was asked.
+    Steps are equal in arc length on the surface: the remainder is spread, so
+    the step becomes length / round(length / step). Up to 5 % of a step is left
+    at each end when that brings the steps closer to what was asked. With
+    `strategy = "grid"` steps are equal in the plan view; with
+    `density = "adaptive"` they shrink where the surface curves along the line
+    and grow where it is flat, so that the chord error stays what it was told.
     """
-    length = np.linalg.norm(np.diff(_lifted(line, surface), axis=0), axis=1)
+    path, normals = surface.at(line.points, np.concatenate([line.face, line.face[-1:]]))
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(length)])
-    if s[-1] < 0.02 * step_mm:
+    if s[-1] < SPECK_OF_STEP * settings.step_mm:
         return None
-    at = _stations(float(s[-1]), step_mm, closed=line.closed)
+    at = _spaced(s, path, normals, settings, closed=line.closed)
     segment = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(length) - 1)
     t = (at - s[segment]) / np.maximum(length[segment], 1e-12)
     flat = line.points[segment] + t[:, None] * (line.points[segment + 1] - line.points[segment])
@@ -71,9 +80,28 @@ def stroke_from_line(line: Line, surface: SmoothSurface, step_mm: float) -> Stro
     return Stroke(points, normals, at - at[0], line.level, line.closed)
 
 
-def _lifted(line: Line, surface: SmoothSurface) -> Array:
-    face = np.concatenate([line.face, line.face[-1:]])
-    return surface.at(line.points, face)[0]
+def _spaced(s: Array, path: Array, normals: Array, settings: Plan, *, closed: bool) -> Array:
+    """Return the arc lengths of the readings: even in a measure that runs along the line."""
+    if settings.strategy == "grid":
+        measure = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1))])
+    elif settings.density == "adaptive":
+        measure = _by_curvature(s, normals, settings)
+    else:
+        return _stations(float(s[-1]), settings.step_mm, closed=closed)
+    if measure[-1] < SPECK_OF_STEP * settings.step_mm:
+        measure = s
+    return np.interp(_stations(float(measure[-1]), settings.step_mm, closed=closed), measure, s)
+
+
+def _by_curvature(s: Array, normals: Array, settings: Plan) -> Array:
+    """Return a measure that runs faster where the line curves: the chord of a step h sags by h^2 k / 8."""
+    turn = 2 * np.arcsin(np.clip(np.linalg.norm(np.diff(normals, axis=0), axis=1) / 2, 0, 1))
+    reach = np.clip(np.diff(s), 1e-9, None)
+    window = max(1, round(settings.step_mm / max(float(np.median(reach)), 1e-9)))
+    curvature = uniform_filter1d(turn, window, mode="nearest") / uniform_filter1d(reach, window, mode="nearest")
+    wanted = np.sqrt(8 * settings.chord_error_mm / np.maximum(curvature, 1e-9))
+    step = np.clip(wanted, SHORTEST_OF_STEP * settings.step_mm, LONGEST_OF_STEP * settings.step_mm)
+    return np.concatenate([[0.0], np.cumsum(reach * settings.step_mm / step)])
 
 
 def _stations(length: float, step: float, *, closed: bool) -> Array:

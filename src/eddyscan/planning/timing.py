@@ -22,8 +22,8 @@ class MotionLimits:
 
     speed_mm_s: tuple[float, float, float] = (29.0, 29.0, 24.0)
     acceleration_mm_s2: tuple[float, float, float] = (200.0, 200.0, 200.0)
-    reading_s: float = 0.02
-    command_s: float = 0.02
+    reading_s: float = 0.015
+    command_s: float = 0.008
 
 
 def move_times(positions: Array, speed_mm_s: Array, limits: MotionLimits) -> Array:
