@@ -239,3 +239,28 @@ def test_report_opens_by_ticket_in_a_sandbox(served, inspection):
 )
 def test_other_addresses_hold_nothing(shared, path):
     assert shared.visitor().request("GET", path)[0] == 404
+
+
+def test_open_to_the_network_asks_for_the_password(inspection, serve):
+    served = serve(inspection.folder.parent, host="0.0.0.0", password="correct horse")
+    stranger = Visitor(served.door.access.port, None)
+    status, _, page = stranger.request("GET", "/")
+    assert status == 401
+    assert b'type="password"' in page
+    assert stranger.post("/login", {"password": "wrong"})[0] == 401
+    assert stranger.post("/login", {"password": 7}, Origin="http://evil.example")[0] == 403
+    status, answer = stranger.post("/login", {"password": "correct horse"})
+    assert status == 200
+    assert Visitor(served.door.access.port, answer["token"]).ask("list")[0] == 200
+
+
+def test_real_rig_of_an_inspection_does_not_move_unarmed(inspection, serve):
+    inspection.rig_file.write_text('[stage]\naddress = "tcp://127.0.0.1:9"\n[instrument]\naddress = "ASRL1::INSTR"\n')
+    served = serve(inspection.folder.parent, line="eddyscan.pipeline")
+    visitor = served.visitor()
+    assert visitor.ask("overview", name="plate-1")[1]["virtual"] is False
+    with visitor.live() as wire:
+        visitor.run("plate-1", "record")
+        message = news_until(wire, job_state("failed"), seconds=60)[-1]["job"]["message"]
+    assert "is a real rig; it moves only with --rig" in message
+    assert "--arm" in message

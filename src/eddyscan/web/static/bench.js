@@ -59,7 +59,7 @@ export class Bench {
     this.drawSteps();
     await this.picture.load();
     if (this.left) return;
-    this.showPanel();
+    if (!this.panel?.keeps?.()) this.showPanel(); // what somebody is typing stays
     this.panel?.loaded?.();
   }
 

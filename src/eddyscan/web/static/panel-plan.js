@@ -70,6 +70,10 @@ export class Plan {
     this.where.textContent = `${duration(time)}: ${kind} row ${plan.row[k] + 1}, tilt ${number(plan.tilt_deg[k], 1)} deg, lift-off ${number(plan.lift_off_mm[k], 2)} mm`;
   }
 
+  keeps() {
+    return this.form.edited;
+  }
+
   leave() {
     clearInterval(this.timer);
     this.bench.picture.viewer.setProbe(null);

@@ -17,7 +17,7 @@ export class Results {
     this.list = h("div", { class: "card" });
     this.about = h("div", {});
     this.channels = h("div", {});
-    this.chosen = null;
+    this.chosen = bench.chosenIndication || null;
     const charts = h("div", { class: "card" }, h("h3", {}, "Impedance plane of the residual"), this.plane.canvas, h("p", { class: "quiet" }, "Residual: reading minus sound metal at that lift-off and tilt."));
     bench.picture.dock.replaceChildren(h("div", { class: "strip" }, this.strip.canvas));
     this.element = h("div", {}, h("h2", {}, "Results"), this.list, this.about, this.channels, charts);
@@ -37,6 +37,11 @@ export class Results {
     };
     this.markers();
     this.draw();
+    if (!this.keeps()) this.drawAbout();
+  }
+
+  keeps() {
+    return Boolean(this.element.querySelector("#comment")?.value);
   }
 
   leave() {
@@ -86,6 +91,7 @@ export class Results {
 
   choose(number_) {
     this.chosen = number_;
+    this.bench.chosenIndication = number_;
     this.drawList();
     this.drawAbout();
     this.markers();
@@ -130,6 +136,7 @@ export class Results {
       localStorage.setItem("name", name.value.trim());
       const entry = await ask("decide", { name: this.app.name, decision: { number: one.number, verdict, name: name.value, comment: comment.value } });
       this.app.overview.decisions.push(entry);
+      comment.value = "";
       this.drawList();
       this.drawAbout();
       say(`Indication ${one.number} ${VERDICTS[verdict]} by ${entry.name}.`);

@@ -123,6 +123,7 @@ export class Surface {
   async save(crop) {
     if (this.element.querySelector('[aria-invalid="true"]')) throw new Error("A limit of the crop box is not usable: the lower one must be below the upper one.");
     await ask("save", { name: this.app.name, changes: { surface: { crop } } });
+    this.saved = true;
     say(crop ? "The crop box is in the technique. Make the surface again." : "Back to automatic. Make the surface again.");
   }
 
@@ -130,6 +131,10 @@ export class Surface {
     if (this.place && this.app.overview.crop) this.drawCrop();
     const begin = this.place?.querySelector("#crop");
     if (begin) begin.disabled = !this.viewer.bounds;
+  }
+
+  keeps() {
+    return Boolean(this.box) && !this.saved;
   }
 
   leave() {
