@@ -150,15 +150,15 @@ def slot_basis(slot: Slot, metal: SlottedMetal, detail_m: float, functions: tupl
     TechniqueError
         The slot needs more functions along its length than the solver takes.
     """
-    along = 18 + int(1.9 * slot.half_length_m / detail_m)
+    along = 17 + int(2.6 * slot.half_length_m / detail_m)
     if along > MOST_ALONG and functions is None:
-        longest = (MOST_ALONG - 18) / 1.9 * 2 * detail_m / MM
+        longest = (MOST_ALONG - 17) / 2.6 * 2 * detail_m / MM
         raise TechniqueError(
             f"length_mm = {slot.length_mm:g}: must be at most {longest:.3g} mm for a coil of mean radius "
             f"{detail_m / MM:g} mm. Cut the slot to the stretch the coil passes."
         )
     if slot.profile == "semi-elliptic":
-        degree = max(functions) if functions else int(20 + 0.5 * (along - 18) + 0.5 * slot.depth_m / metal.skin_m)
+        degree = max(functions) if functions else int(20 + 0.4 * (along - 17) + 0.5 * slot.depth_m / metal.skin_m)
         if degree > MOST_DEGREE:
             raise TechniqueError(
                 f"depth_mm = {slot.depth_mm:g} is {slot.depth_m / metal.skin_m:.0f} skin depths and length_mm = "
