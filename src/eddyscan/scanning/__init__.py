@@ -6,6 +6,7 @@ protocols, never a driver or a simulator.
 
 from eddyscan.scanning.alignment import TouchAlignment, align_from_corner, align_from_points
 from eddyscan.scanning.checking import check
+from eddyscan.scanning.experiment import StageExperiment, stage_experiment
 from eddyscan.scanning.jog import JogSession, JogState
 from eddyscan.scanning.keep_out import KeepOut
 from eddyscan.scanning.running import run
@@ -14,9 +15,11 @@ __all__ = [
     "JogSession",
     "JogState",
     "KeepOut",
+    "StageExperiment",
     "TouchAlignment",
     "align_from_corner",
     "align_from_points",
     "check",
     "run",
+    "stage_experiment",
 ]
