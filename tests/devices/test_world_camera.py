@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from eddyscan.core.depth import DepthImage
-from eddyscan.core.frames import apply, invert
+from eddyscan.core.fiducials import FiducialSheet
+from eddyscan.core.frames import apply, invert, transform
 from eddyscan.core.parts import PARTS
 from eddyscan.devices.protocols import DepthCamera
 from eddyscan.devices.sim.camera import VirtualDepthCamera
@@ -167,6 +168,30 @@ class TestSensorTerms:
     def test_fields_have_unit_variance(self, length):
         field = gaussian_field((920, 1280), length, np.random.default_rng(2))
         assert field.std() == pytest.approx(1.0, rel=0.25 if length > 10 else 0.05)
+
+
+class TestInfrared:
+    def test_without_a_sheet_there_is_no_picture(self, exact_view):
+        assert exact_view[0].intensity is None
+
+    def test_the_sheet_gives_every_view_its_pose(self):
+        import cv2
+
+        scene = build_scene("block-a", seed=5, clutter=0, edge_mm=1.0)
+        camera = VirtualDepthCamera(scene, WorldCamera(fiducials=True), 5)
+        sheet = FiducialSheet()
+        detector = cv2.aruco.CharucoDetector(sheet.board())
+        K = np.array([[OS30A.fx, 0, OS30A.cx], [0, OS30A.fy, OS30A.cy], [0, 0, 1.0]])
+        T_table_sheet = camera._infrared.T_table_sheet
+        for image, pose in zip(camera.capture_views(2), camera.true_poses(2), strict=True):
+            corners, ids, _, _ = detector.detectBoard(image.intensity)
+            assert len(ids) > 20
+            points, pixels = sheet.board().matchImagePoints(corners, ids)
+            _, turn, shift = cv2.solvePnP(points, pixels, K, None)
+            found = transform(cv2.Rodrigues(turn)[0], shift.ravel())
+            error = invert(found) @ invert(pose) @ T_table_sheet
+            assert np.linalg.norm(error[:3, 3]) < 0.5
+            assert np.degrees(np.arccos(np.clip((np.trace(error[:3, :3]) - 1) / 2, -1, 1))) < 0.2
 
 
 class TestPoses:

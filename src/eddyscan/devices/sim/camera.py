@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from eddyscan.core.depth import DepthImage
+from eddyscan.core.fiducials import FiducialSheet
 from eddyscan.core.frames import Array
 from eddyscan.core.progress import Progress, silent
 from eddyscan.devices.protocols import Identity
+from eddyscan.devices.sim.camera_infrared import InfraredView
 from eddyscan.devices.sim.camera_raycast import Raycaster
 from eddyscan.devices.sim.sensor import StereoSensor
 from eddyscan.devices.sim.world_scene import OS30A, PART_SOLID, Scene, camera_poses
@@ -24,6 +26,7 @@ class VirtualDepthCamera:
         self._scene, self._options, self._seed = scene, options, seed
         self._raycaster: Raycaster | None = None
         self._sensor: StereoSensor | None = None
+        self._infrared = InfraredView(scene, FiducialSheet(), seed) if options.fiducials else None
         self._taken = 0
         self._poses = self._draw_poses(options.views, seed)
 
@@ -64,5 +67,7 @@ class VirtualDepthCamera:
         if self._sensor is None:
             self._sensor = StereoSensor.made(self._options, OS30A.fx, (OS30A.height, OS30A.width), self._seed)
         hits = self._raycaster.cast(OS30A, pose)
-        depth = self._sensor.depth(hits, hits.solid == PART_SOLID, np.random.default_rng([*noise_seed, 3]))
-        return DepthImage(depth.astype(np.float64), OS30A, name)
+        rng = np.random.default_rng([*noise_seed, 3])
+        depth = self._sensor.depth(hits, hits.solid == PART_SOLID, rng)
+        picture = None if self._infrared is None else self._infrared.picture(hits, OS30A, pose, rng)
+        return DepthImage(depth.astype(np.float64), OS30A, name, intensity=picture)
