@@ -166,6 +166,15 @@ def test_the_scene_is_strict_json_with_matching_arrays() -> None:
     assert indications["text"] == ["1", "2"]
 
 
+def test_the_scene_keeps_true_proportions() -> None:
+    view = json.loads(scene_json(small_inspection()))["layout"]["scene"]
+    sides = {axis: float(np.ptp(view[f"{axis}axis"]["range"])) for axis in "xyz"}
+    scale = {axis: view["aspectratio"][axis] / sides[axis] for axis in "xyz"}
+    assert scale["y"] == pytest.approx(scale["x"])
+    assert scale["z"] == pytest.approx(scale["x"])
+    assert max(view["aspectratio"].values()) == pytest.approx(2.0)
+
+
 def test_the_strongest_crack_signal_is_not_clipped_in_the_scene() -> None:
     content = whole_inspection(edge_mm=4.0)
     assert content.cscan is not None

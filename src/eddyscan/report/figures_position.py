@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from eddyscan.core.frames import IntArray
 from eddyscan.core.record import ScanRecord
 from eddyscan.report.envelopes import sparse
 from eddyscan.report.theme import Theme, canvas
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = ("x", "y", "z")
-MOST_MARKS = 1500
+MOST_MARKS, MOST_ROWS = 1500, 25
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def position_figure(record: ScanRecord, theme: Theme) -> Figure:
     figure, (side, above) = canvas(height_in=3.0, columns=2)
     row = longest_row(record)
     every = np.arange(len(record))
-    shown = every[sparse(len(record), MOST_MARKS)]
+    shown, step = _evenly_chosen_rows(record)
     for axes, chosen, (i, j) in ((side, every[record.row == row], (0, 2)), (above, shown, (0, 1))):
         planned, recorded = record.target_mm[chosen], record.stage_mm[chosen]
         axes.plot(planned[:, i], planned[:, j], "o", mfc="none", mec=theme.accent, ms=4.5, mew=0.9, label="planned")
@@ -61,10 +62,20 @@ def position_figure(record: ScanRecord, theme: Theme) -> Figure:
         axes.set_xlabel(f"{AXES[i]} stage [mm]")
         axes.set_ylabel(f"{AXES[j]} stage [mm]")
     side.set_title(f"Row {row}: x and z")
-    step = len(record) // len(shown)
-    above.set_title("Whole scan: x and y" + (f", every {step}th reading" if step > 1 else ""))
+    above.set_title("Whole scan: x and y" if step == 1 else f"x and y, 1 of {step} rows")
     side.legend(loc="best")
     return figure
+
+
+def _evenly_chosen_rows(record: ScanRecord) -> tuple[IntArray, int]:
+    """Return the readings of every k-th row, few enough to be seen as points, and k."""
+    every = np.arange(len(record))
+    if len(record) <= MOST_MARKS:
+        return every, 1
+    rows = np.unique(record.row)
+    step = -(-len(rows) // MOST_ROWS)
+    chosen = every[np.isin(record.row, rows[::step])]
+    return chosen[sparse(len(chosen), MOST_MARKS)], step
 
 
 def error_figure(record: ScanRecord, theme: Theme) -> Figure:

@@ -18,6 +18,7 @@ from eddyscan.report.words import label
 MOST_VERTICES = 30_000
 MOST_PATH_POINTS = 20_000
 MOST_ROWS = 40  # more would hide the surface: the reader shows them by a click on the legend
+MARK_ABOVE_MM = 1.5
 GREY, GREY_SHARE = "#8a949d", 0.02
 
 
@@ -37,7 +38,7 @@ def scene_json(content: ReportContent) -> str:
     layers = {name: values[keep] for name, values in _layers(content, mesh).items()}
     traces = [_surface(mesh, keep, faces, layers), *_path(content), *_indications(content)]
     layout = {
-        "scene": {"aspectmode": "data", "camera": {"eye": {"x": -0.75, "y": -1.9, "z": 1.25}}, **_scene_axes()},
+        "scene": _view(content, mesh),
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "height": 520,
         "showlegend": True,
@@ -49,11 +50,23 @@ def scene_json(content: ReportContent) -> str:
     return json.dumps({"data": traces, "layout": layout})
 
 
-def _scene_axes() -> dict[str, Any]:
-    return {
-        f"{axis}axis": {"title": {"text": f"{axis} [mm]"}, "backgroundcolor": "rgba(0,0,0,0)", "showspikes": False}
-        for axis in "xyz"
+def _view(content: ReportContent, mesh: SurfaceMesh) -> dict[str, Any]:
+    """Return axes in true proportion, framed alike for every part: the longest side is two units."""
+    shown = mesh.vertices if content.plan is None else np.vstack([mesh.vertices, content.plan.T_part_probe[:, :3, 3]])
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    rim = 0.02 * float((high - low).max())
+    sides = high - low + 2 * rim
+    axes = {
+        f"{axis}axis": {
+            "title": {"text": f"{axis} [mm]"},
+            "range": [float(low[k] - rim), float(high[k] + rim)],
+            "backgroundcolor": "rgba(0,0,0,0)",
+            "showspikes": False,
+        }
+        for k, axis in enumerate("xyz")
     }
+    ratio = {axis: float(2 * sides[k] / sides.max()) for k, axis in enumerate("xyz")}
+    return {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": -0.6, "y": -1.6, "z": 1.05}}, **axes}
 
 
 def _layers(content: ReportContent, mesh: SurfaceMesh) -> dict[str, Array]:
@@ -139,6 +152,7 @@ def _indications(content: ReportContent) -> list[dict[str, Any]]:
     if not content.indications:
         return []
     centres = np.array([indication.centre_mm for indication in content.indications])
+    centres[:, 2] += MARK_ABOVE_MM  # a mark inside the surface would be hidden
     axes = {axis: typed(centres[:, k]) for k, axis in enumerate("xyz")}
     return [
         {

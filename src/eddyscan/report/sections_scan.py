@@ -116,7 +116,7 @@ def positions(content: ReportContent) -> Section:
         (
             Chart(
                 partial(position_figure, record),
-                f"Left: row {longest_row(record)} in x and z. Right: all rows in x and y.",
+                f"Left: row {longest_row(record)} in x and z. Right: x and y.",
             ),
             Table(columns, rows, "Position error per axis"),
             Chart(partial(error_figure, record), "Position errors per axis; the line marks the mean."),
