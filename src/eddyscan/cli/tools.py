@@ -135,7 +135,8 @@ def signal(
 
     if sweep not in (None, "frequency", "lift-off"):
         raise InputError(f"--sweep {sweep}: can be frequency or lift-off.")
-    result = pipeline.signal(case, sweep=sweep, plot=plot)
+    with progress_bars() as progress:
+        result = pipeline.signal(case, sweep=sweep, plot=plot, progress=progress)
     table(f"{case}", *pipeline.signal_table(result))
     if plot:
         say(f"picture: {plot}")
