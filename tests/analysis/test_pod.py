@@ -1,58 +1,44 @@
-"""POD estimators against curves that are known."""
-
 import numpy as np
 import pytest
-from scipy.special import expit
+from scipy.stats import norm
 
-from eddyscan.analysis.pod import hit_miss, signal_response
+from eddyscan.analysis.pod import pod_from_hits, pod_from_signals
 from eddyscan.core.errors import InputError
 
-TRUE_A90 = float(np.exp(np.log(0.6) + 0.15 * np.log(9)))  # logit curve with mu = log 0.6, sigma = 0.15
+RNG = np.random.default_rng(3)
+SIZES = np.exp(RNG.uniform(np.log(0.2), np.log(3.0), 400))
+SIGNAL = np.exp(1.5 + 1.6 * np.log(SIZES) + 0.3 * RNG.standard_normal(400))
+TRUE_A90 = float(np.exp((np.log(6.0) - 1.5) / 1.6 + norm.ppf(0.9) * 0.3 / 1.6))
 
 
-def draw_hits(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    draw = np.random.default_rng(seed)
-    sizes = np.exp(draw.uniform(np.log(0.3), np.log(1.5), n))
-    return sizes, draw.random(n) < expit((np.log(sizes) - np.log(0.6)) / 0.15)
+def test_the_size_found_nine_times_in_ten_from_signals():
+    curve = pod_from_signals(SIZES, SIGNAL, threshold=6.0, basis="simulated")
+    assert curve.a90_mm == pytest.approx(TRUE_A90, rel=0.04)
+    assert curve.a50_mm < curve.a90_mm < curve.a90_95_mm < 1.15 * curve.a90_mm
+    assert curve.at(np.array([curve.a90_mm]))[0] == pytest.approx(0.9)
+    assert curve.basis == "simulated"
 
 
-def test_hit_miss_recovers_a_known_curve() -> None:
-    curve = hit_miss(*draw_hits(20_000, 1))
-    assert curve.a90_mm == pytest.approx(TRUE_A90, rel=0.02)
-    assert curve.a90_mm < curve.a90_95_mm < 1.05 * TRUE_A90
+def test_the_same_from_hits_and_misses():
+    curve = pod_from_hits(SIZES, SIGNAL > 6.0, basis="simulated")
+    assert curve.a90_mm == pytest.approx(TRUE_A90, rel=0.10)
+    assert curve.a90_mm < curve.a90_95_mm
 
 
-def test_the_upper_bound_holds_for_about_95_of_100_experiments() -> None:
-    bounds = np.array([hit_miss(*draw_hits(300, seed)).a90_95_mm for seed in range(300)])
-    assert 0.90 <= (bounds >= TRUE_A90).mean() <= 0.99
+def test_the_confidence_limit_holds_in_19_of_20():
+    held = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        size = np.exp(rng.uniform(np.log(0.3), np.log(3.0), 40))
+        signal = np.exp(1.5 + 1.6 * np.log(size) + 0.3 * rng.standard_normal(40))
+        held += pod_from_signals(size, signal, threshold=6.0, basis="-").a90_95_mm > TRUE_A90
+    assert held / 60 >= 0.86
 
 
-def test_signal_response_recovers_a_known_curve_and_its_bound() -> None:
-    true_a90 = float(np.exp((np.log(3.0) - np.log(10.0)) / 1.5 + 1.2815515655 * 0.2 / 1.5))
-    covered = 0
-    for seed in range(300):
-        draw = np.random.default_rng(seed)
-        sizes = np.exp(draw.uniform(np.log(0.2), np.log(2.0), 100))
-        signal = 10.0 * sizes**1.5 * np.exp(0.2 * draw.standard_normal(100))
-        curve = signal_response(sizes, signal, threshold=3.0)
-        assert curve.a90_mm == pytest.approx(true_a90, rel=0.1)
-        covered += curve.a90_95_mm >= true_a90
-    assert 0.90 <= covered / 300 <= 0.99
-
-
-@pytest.mark.parametrize(
-    ("sizes", "hits", "words"),
-    [
-        (np.linspace(0.1, 1, 20), np.linspace(0.1, 1, 20) > 0.5, "every hit is larger than every miss"),
-        (np.linspace(0.1, 1, 20), np.ones(20, bool), "20 hits and 0 misses"),
-    ],
-)
-def test_data_without_a_curve_are_refused(sizes: np.ndarray, hits: np.ndarray, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        hit_miss(sizes, hits)
-
-
-def test_signals_that_fall_with_size_are_refused() -> None:
-    sizes = np.linspace(0.1, 1, 20)
-    with pytest.raises(InputError, match="do not grow"):
-        signal_response(sizes, 1 / sizes, threshold=1.0)
+def test_data_that_fix_no_curve_are_refused():
+    with pytest.raises(InputError, match=r"3 usable signals at 3 sizes are too few.*at least 8"):
+        pod_from_signals(SIZES[:3], SIGNAL[:3], threshold=6.0, basis="-")
+    with pytest.raises(InputError, match="does not grow with size"):
+        pod_from_signals(SIZES, 1 / SIGNAL, threshold=6.0, basis="-")
+    with pytest.raises(InputError, match="400 hits and 0 misses do not fix"):
+        pod_from_hits(SIZES, np.ones(400, dtype=bool), basis="-")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.spatial import KDTree
 
-from eddyscan.core.frames import Array, IntArray
+from eddyscan.core.frames import Array, BoolArray, IntArray
 
 MAD_TO_SIGMA = 1.4826
 SHORTEST_WINDOW = 5
+MOST_CELLS = 40
+PLANE_ROUNDS = 3
 
 
 def robust_sigma(values: Array) -> float:
@@ -71,3 +74,51 @@ def _running_median(values: Array, position_mm: Array, window_mm: float) -> Arra
     count = int(np.ceil(window_mm / max(step, 1e-9))) | 1
     count = max(SHORTEST_WINDOW, min(count, len(values) - 1 | 1))
     return np.asarray(median_filter(values, size=count, mode="nearest"))
+
+
+def slow_over_surface(channel: Array, foot_mm: Array, *, cell_mm: float, radius_mm: float) -> Array:
+    """Return a robust local plane over the surface: what neighbouring rows share and a crack is too small for.
+
+    Parameters
+    ----------
+    channel : (M,) NaN left out
+    foot_mm : (M, 3) [mm]
+    cell_mm : float [mm]
+        Readings are averaged in cubic cells of this size first.
+    radius_mm : float [mm]
+        Cells this near take part in the fit; a crack must cover well below half of them.
+    """
+    known = np.isfinite(channel)
+    cell = np.floor(foot_mm[known] / cell_mm).astype(np.int64)
+    _, number, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    number = number.ravel()
+    place = np.stack([np.bincount(number, foot_mm[known, k]) / count for k in range(3)], axis=1)
+    mean = np.bincount(number, channel[known]) / count
+    tree = KDTree(place)
+    reach = min(len(place), MOST_CELLS)
+    distance, near = tree.query(place, k=reach)
+    near = np.reshape(near, (-1, reach))
+    smooth = _local_planes(place, mean, near, np.reshape(distance, (-1, reach)) <= radius_mm)
+    weight_distance, at = tree.query(foot_mm[known], k=min(4, len(place)))
+    weight = np.exp(-0.5 * (np.reshape(weight_distance, (known.sum(), -1)) / cell_mm) ** 2) + 1e-12
+    out = np.full(len(channel), np.nan)
+    out[known] = (weight * smooth[np.reshape(at, weight.shape)]).sum(axis=1) / weight.sum(axis=1)
+    return out
+
+
+def _local_planes(place: Array, value: Array, near: IntArray, inside: BoolArray) -> Array:
+    """Return the value at each cell (K,) of a plane fitted robustly to the cells around it."""
+    offset = place[near] - place[:, None]
+    basis = np.concatenate([np.ones((*near.shape, 1)), offset], axis=2)
+    data, keep = value[near], inside.astype(np.float64)
+    ridge = np.diag([1e-9, 1e-2, 1e-2, 1e-2])
+    middle = np.nanmedian(np.where(inside, data, np.nan), axis=1, keepdims=True)
+    left = data - middle
+    for _ in range(PLANE_ROUNDS):
+        scale = MAD_TO_SIGMA * np.nanmedian(np.where(inside, np.abs(left), np.nan), axis=1, keepdims=True)
+        keep = inside * np.clip(1.0 - (left / (3.0 * np.maximum(scale, 1e-300))) ** 2, 0.0, 1.0) ** 2
+        weighted = basis * keep[..., None]
+        normal = np.swapaxes(weighted, 1, 2) @ basis + ridge
+        fit = np.linalg.solve(normal, np.swapaxes(weighted, 1, 2) @ data[..., None])
+        left = data - (basis @ fit)[..., 0]
+    return np.asarray(fit[:, 0, 0])

@@ -3,61 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from eddyscan.analysis.background import robust_sigma
+from eddyscan.analysis.gap_field import SurfaceCorrection, gap_field
 from eddyscan.analysis.result import AnalysisResult
 from eddyscan.core.errors import InputError
-from eddyscan.core.footing import footing, tangent_frames
+from eddyscan.core.footing import footing
 from eddyscan.core.frames import Array, BoolArray
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.plan import SCAN, ScanPlan
 from eddyscan.core.record import ScanRecord
 from eddyscan.core.technique import Technique
 
-NEIGHBOURS = 24
-ROBUST_ROUNDS = 2
 LARGEST_SLOPE = 0.05
 LARGEST_CORRECTION_MM = 2.0
-READING_SIGMA_MM = 0.002
-GROWTH_BEYOND = 0.01
 LEAST_FIT = 6
-
-
-@dataclass(frozen=True)
-class SurfaceCorrection:
-    """How much further away the metal is than the mesh says, where the probe has been.
-
-    Attributes
-    ----------
-    foot_mm : (M, 3) [mm, part] spots on the believed surface
-    normal : (M, 3)
-    gap_mm : (M,) [mm]
-        Measured minus believed distance along the normal: positive where the true
-        surface lies lower. Holds the pose's and the stage's repeatable errors too.
-    spacing_mm : float [mm] typical distance of neighbouring readings
-    width_mm : float [mm]
-        Standard distance of the smoothing; never below the coil's outer radius.
-    scatter_mm : float [mm] robust scatter of single readings about the smooth field
-    frozen : int
-        Readings left out because a signal other than lift-off spoke there.
-    """
-
-    foot_mm: Array
-    normal: Array
-    gap_mm: Array
-    spacing_mm: float
-    width_mm: float
-    scatter_mm: float
-    frozen: int
-
-    def at(self, points_mm: Array) -> tuple[Array, Array]:
-        """Return the smooth gap and its standard uncertainty at points (K, 3) [mm, part]: (K,), (K,) [mm]."""
-        gap, sigma, _ = _smooth(self, points_mm)
-        return gap, sigma
 
 
 def surface_correction(
@@ -90,14 +52,13 @@ def surface_correction(
         )
     below = footing(mesh, record.part_mm[used], axis=None)
     gap = result.lift_off_mm[used] - below.distance_mm
-    spacing = _spacing(below.foot_mm)
-    width = max(1.2 * spacing, technique.probe.outer_radius_mm)
-    rough = SurfaceCorrection(
-        below.foot_mm, below.normal, gap, spacing, width, READING_SIGMA_MM, int((known & loud).sum())
+    return gap_field(
+        below.foot_mm,
+        below.normal,
+        gap,
+        least_width_mm=technique.probe.outer_radius_mm,
+        frozen=int((known & loud).sum()),
     )
-    smooth, _, _ = _smooth(rough, below.foot_mm)
-    scatter = max(robust_sigma(gap - smooth), READING_SIGMA_MM)
-    return dataclasses.replace(rough, scatter_mm=scatter)
 
 
 def corrected_plan(
@@ -160,15 +121,18 @@ def corrected_plan(
     return dataclasses.replace(plan, T_part_probe=T, notes=(*plan.notes, note))
 
 
-def corrected_surface(mesh: SurfaceMesh, correction: SurfaceCorrection) -> SurfaceMesh:
+def corrected_surface(
+    mesh: SurfaceMesh, correction: SurfaceCorrection, *, reach_mm: float | None = None
+) -> SurfaceMesh:
     """Return the mesh moved to where the probe found the metal, with the uncertainty of that.
 
-    Vertices beyond the smoothing width of the nearest reading fade back to the
-    camera's surface over another two widths and keep its uncertainty.
+    Vertices further than `reach_mm` (default: the smoothing width) from every reading
+    fade back to the camera's surface over another two widths and keep its uncertainty.
     """
     gap, sigma = correction.at(mesh.vertices)
     distance, _ = KDTree(correction.foot_mm).query(mesh.vertices)
-    trust = np.clip(1.5 - distance / (2.0 * correction.width_mm), 0.0, 1.0)
+    reach = correction.width_mm if reach_mm is None else reach_mm
+    trust = np.clip(1.0 - (distance - reach) / (2.0 * correction.width_mm), 0.0, 1.0)
     own = np.full(len(gap), np.nan) if mesh.uncertainty_mm is None else mesh.uncertainty_mm
     moved = mesh.vertices - mesh.normals * (trust * gap)[:, None]
     mixed = np.hypot(trust * sigma, (1.0 - trust) * np.nan_to_num(own))
@@ -188,46 +152,6 @@ def _near_loud(part_mm: Array, score: Array, known: BoolArray, technique: Techni
         return loud
     distance, _ = KDTree(part_mm[loud]).query(part_mm)
     return np.asarray(distance <= 2 * technique.probe.outer_radius_mm)
-
-
-def _spacing(foot_mm: Array) -> float:
-    """Return the distance to the fourth neighbour: across rows as well as along."""
-    distance, _ = KDTree(foot_mm).query(foot_mm, k=min(5, len(foot_mm)))
-    return float(np.median(np.asarray(distance)[:, -1]))
-
-
-def _smooth(correction: SurfaceCorrection, points_mm: Array) -> tuple[Array, Array, Array]:
-    """Return gap, uncertainty and distance to the nearest reading by robust local quadratic regression."""
-    k = min(max(NEIGHBOURS, _dense_count(correction)), len(correction.gap_mm))
-    distance, near = KDTree(correction.foot_mm).query(points_mm, k=k)
-    distance, near = np.reshape(distance, (len(points_mm), k)), np.reshape(near, (len(points_mm), k))
-    frame = tangent_frames(correction.normal[near[:, 0]])
-    local = np.einsum("kij,knj->kni", frame[:, :2], correction.foot_mm[near] - points_mm[:, None])
-    s, t = local[..., 0] / correction.width_mm, local[..., 1] / correction.width_mm
-    width = np.maximum(correction.width_mm, 0.7 * distance[:, : min(8, k)].max(axis=1))[:, None]
-    weight = np.exp(-0.5 * (distance / width) ** 2)
-    basis = np.stack([np.ones_like(s), s, t, s * s, s * t, t * t], axis=-1)
-    value = correction.gap_mm[near]
-    ridge = np.diag([1e-9, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2])
-    factor = np.ones_like(weight)
-    for _ in range(ROBUST_ROUNDS + 1):
-        weighted = basis * (weight * factor)[..., None]
-        normal = np.swapaxes(weighted, 1, 2) @ basis + ridge
-        fit = np.linalg.solve(normal, np.swapaxes(weighted, 1, 2) @ value[..., None])[..., 0]
-        left = value - np.einsum("kni,ki->kn", basis, fit)
-        scale = 4.0 * np.maximum(1.4826 * np.median(np.abs(left), axis=1, keepdims=True), correction.scatter_mm)
-        factor = np.clip(1.0 - (left / scale) ** 2, 0.0, 1.0) ** 2
-    count = np.maximum((weight * factor).sum(axis=1), 1e-3)
-    spread = np.sqrt((weight * factor * left**2).sum(axis=1) / count + correction.scatter_mm**2)
-    beyond = np.maximum(distance[:, 0] - correction.spacing_mm, 0.0)
-    return fit[:, 0], np.hypot(spread / np.sqrt(count), GROWTH_BEYOND * beyond), distance[:, 0]
-
-
-def _dense_count(correction: SurfaceCorrection) -> int:
-    """Return how many readings lie within two smoothing widths (at most 80)."""
-    sample = correction.foot_mm[:: max(1, len(correction.foot_mm) // 200)]
-    counts = KDTree(correction.foot_mm).query_ball_point(sample, 2 * correction.width_mm, return_length=True)
-    return int(min(80, np.median(counts)))
 
 
 def _shifts(mesh: SurfaceMesh, correction: SurfaceCorrection, plan: ScanPlan, scan: BoolArray) -> Array:

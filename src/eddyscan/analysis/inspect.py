@@ -6,8 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from eddyscan.analysis.background import explained, robust_sigma, slow_along_rows
-from eddyscan.analysis.detection import blob_score
+from eddyscan.analysis.background import (
+    explained,
+    robust_sigma,
+    slow_along_rows,
+    slow_over_surface,
+)
+from eddyscan.analysis.correction import corrected_surface
+from eddyscan.analysis.detection import match_cracks
+from eddyscan.analysis.gap_field import gap_field
 from eddyscan.analysis.indications import Signals, find_indications
 from eddyscan.analysis.mapping import map_to_surface
 from eddyscan.analysis.readings import Readings, usable
@@ -31,7 +38,8 @@ from eddyscan.physics.sound_response import (
 )
 
 SLOW_WINDOW_IN_DIAMETERS = 8.0
-FOOTPRINT_IN_MEAN_RADII = 0.6
+LEAST_FOR_SURFACE = 50
+EXTRAPOLATED_MM = 8.0
 
 
 def analyse(
@@ -66,11 +74,10 @@ def analyse(
     below = footing(mesh, readings.part_mm, axis=probe_axis(readings, technique))
     progress("lift-off", 1, 4)
     response = response_for(technique, readings, largest_tilt_deg=float(below.tilt_deg.max()))
-    projection = response.project(readings.impedance_ohm, below.tilt_deg)
-    lift_off = projection.lift_off_mm - curvature_gap_mm(response.coil, projection.lift_off_mm, below.curvature_per_mm)
+    below, projection, lift_off = read_lift_off(readings, below, response, mesh, technique)
     progress("residual", 2, 4)
     across = crack_channel(readings, below, projection, technique)
-    signals = _signals(readings, below, projection, across, technique, mesh)
+    signals = _signals(readings, below, projection, across, response, technique, mesh)
     progress("indications", 3, 4)
     found = find_indications(
         signals, threshold=technique.analysis.threshold_mad, merge_mm=2 * technique.probe.outer_radius_mm
@@ -116,6 +123,38 @@ def response_for(technique: Technique, readings: Readings, *, largest_tilt_deg: 
     )
 
 
+def read_lift_off(
+    readings: Readings, below: Footing, response: SoundResponse, mesh: SurfaceMesh, technique: Technique
+) -> tuple[Footing, Projection, Array]:
+    """Return the surface below the readings as the probe found it, their projection, and lift-off (M,) [mm].
+
+    The camera's slopes are off by tenths of a degree, which a tilted coil reads as
+    a false residual. Lift-off and position together tell the true surface, so the
+    tilt comes from there, in a second round.
+    """
+    axis = probe_axis(readings, technique)
+    projection = response.project(readings.impedance_ohm, below.tilt_deg)
+    lift_off = _without_curvature(projection, below, response)
+    known = np.isfinite(lift_off)
+    if axis is not None and known.sum() >= LEAST_FOR_SURFACE:
+        field = gap_field(
+            below.foot_mm[known],
+            below.normal[known],
+            lift_off[known] - below.distance_mm[known],
+            least_width_mm=technique.probe.outer_radius_mm,
+        )
+        below = footing(corrected_surface(mesh, field, reach_mm=EXTRAPOLATED_MM), readings.part_mm, axis=axis)
+        projection = response.project(readings.impedance_ohm, below.tilt_deg)
+        lift_off = _without_curvature(projection, below, response)
+    return below, projection, lift_off
+
+
+def _without_curvature(projection: Projection, below: Footing, response: SoundResponse) -> Array:
+    return np.asarray(
+        projection.lift_off_mm - curvature_gap_mm(response.coil, projection.lift_off_mm, below.curvature_per_mm)
+    )
+
+
 def crack_channel(readings: Readings, below: Footing, projection: Projection, technique: Technique) -> Array:
     """Return the signed residual across the lift-off curve, slow changes taken out (M,) [ohm]."""
     across = projection.across_ohm
@@ -123,20 +162,40 @@ def crack_channel(readings: Readings, below: Footing, projection: Projection, te
     causes = np.column_stack([h, h**2, h**3, tilt, tilt**2, below.curvature_per_mm, readings.time_s])
     left = across - explained(across, causes)
     window = SLOW_WINDOW_IN_DIAMETERS * 2 * technique.probe.outer_radius_mm
-    return np.asarray(left - slow_along_rows(left, readings.row, readings.part_mm, window_mm=window))
+    left = left - slow_along_rows(left, readings.row, readings.part_mm, window_mm=window)
+    diameter = 2 * technique.probe.outer_radius_mm
+    shared = slow_over_surface(left, below.foot_mm, cell_mm=0.6 * diameter, radius_mm=2.2 * diameter)
+    return np.asarray(left - shared)
 
 
 def _signals(
-    readings: Readings, below: Footing, projection: Projection, across: Array, technique: Technique, mesh: SurfaceMesh
+    readings: Readings,
+    below: Footing,
+    projection: Projection,
+    across: Array,
+    response: SoundResponse,
+    technique: Technique,
+    mesh: SurfaceMesh,
 ) -> Signals:
     probe = technique.probe
     falling = -projection.tangent_ohm_mm / np.abs(projection.tangent_ohm_mm)
-    width = FOOTPRINT_IN_MEAN_RADII * (probe.inner_radius_mm + probe.outer_radius_mm) / 2
-    score = blob_score(across, below.foot_mm, width_mm=width)
+    match = match_cracks(
+        across,
+        below.foot_mm,
+        below.normal,
+        response,
+        lift_off_mm=float(np.nanmedian(projection.lift_off_mm)),
+    )
     near = np.nan_to_num(projection.lift_off_mm, nan=np.inf) <= technique.analysis.lift_off_max_mm
     inside = rim_of(mesh).distance_mm(below.foot_mm) > edge_zone_mm(probe.outer_radius_mm)
     return Signals(
-        below.foot_mm, below.normal, readings.row, 1j * across * falling, score, near & inside, robust_sigma(across)
+        below.foot_mm,
+        below.normal,
+        readings.row,
+        1j * across * falling,
+        match.score,
+        near & inside,
+        robust_sigma(across),
     )
 
 

@@ -1,145 +1,131 @@
-"""Probability of detection: hit/miss and signal response, a90 and a90/95.
+"""Probability of detection, the ways of MIL-HDBK-1823A: signal against size, and hit or miss.
 
-Models and confidence bounds as in MIL-HDBK-1823A: a logit of the logarithm of
-size for hits and misses (its appendix G), a straight line of logarithms with
-normal scatter for signals (its appendix H), bounds by the delta method.
+Curves from the virtual cell are simulations; `PodCurve.basis` says so wherever they go.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
+from scipy.optimize import minimize
 from scipy.stats import norm
 
 from eddyscan.core.errors import InputError
 from eddyscan.core.frames import Array, BoolArray
 
-P90 = 0.9
-Z95 = float(norm.ppf(0.95))
-STEPS = 100
-LEAST_HITS = 5
+LEAST_SIZES = 8
+LEAST_HITS = 20
+Z90, Z95 = float(norm.ppf(0.9)), float(norm.ppf(0.95))
 
 
 @dataclass(frozen=True)
 class PodCurve:
-    """POD(a) = link((log a - mu) / sigma).
+    """Normal cumulative curve of detection over the logarithm of size.
 
     Attributes
     ----------
-    kind : "hit/miss" (logistic link) or "signal" (normal link)
-    mu, sigma : location and scale in the natural logarithm of size [mm]
+    mu, sigma : location and scale of log(size in mm)
     covariance : (2, 2) of (mu, sigma)
-    n : readings used
+    a50_mm, a90_mm, a90_95_mm : float [mm]
+        Sizes found 50 and 90 times in 100, and the upper 95 % confidence limit of the latter.
+    method : str
+    basis : str
+        Where the data come from, noise included.
     """
 
-    kind: str
     mu: float
     sigma: float
     covariance: Array
-    n: int
+    a50_mm: float
+    a90_mm: float
+    a90_95_mm: float
+    method: str
+    basis: str
 
     def at(self, size_mm: Array) -> Array:
-        """Return the probability of detection (...) at sizes (...) [mm]."""
-        z = (np.log(size_mm) - self.mu) / self.sigma
-        return np.asarray(expit(z) if self.kind == "hit/miss" else norm.cdf(z))
-
-    def size_mm(self, probability: float, *, confident: bool = False) -> float:
-        """Return the size found with this probability; `confident`: its 95 % upper bound."""
-        z = float(np.log(probability / (1 - probability)) if self.kind == "hit/miss" else norm.ppf(probability))
-        log_size = self.mu + z * self.sigma
-        if confident:
-            gradient = np.array([1.0, z])
-            log_size += Z95 * float(np.sqrt(gradient @ self.covariance @ gradient))
-        return float(np.exp(log_size))
-
-    @property
-    def a90_mm(self) -> float:
-        """Return the size found nine times in ten [mm]."""
-        return self.size_mm(P90)
-
-    @property
-    def a90_95_mm(self) -> float:
-        """Return its 95 % upper confidence bound [mm]."""
-        return self.size_mm(P90, confident=True)
+        """Return the probability of detection (K,) at sizes (K,) [mm]."""
+        return np.asarray(norm.cdf((np.log(size_mm) - self.mu) / self.sigma))
 
 
-def hit_miss(size_mm: Array, hit: BoolArray) -> PodCurve:
-    """Fit a logit POD to hits and misses by maximum likelihood.
+def pod_from_signals(size_mm: Array, signal: Array, *, threshold: float, basis: str) -> PodCurve:
+    """Fit log(signal) = b0 + b1 log(size) + normal scatter and turn it into a detection curve.
 
     Parameters
     ----------
-    size_mm : (N,) flaw sizes [mm]
-    hit : (N,) found or not
+    size_mm, signal : (K,) sizes [mm] and signals (for example signal to noise), all positive
+    threshold : float
+        Call level in the signal's unit.
+    basis : str
 
     Raises
     ------
     InputError
-        With fewer than five hits or misses, or when all hits are larger than all
-        misses (no overlap: the slope has no finite estimate), or size does not help.
+        Fewer than 8 signals, no spread of size, or a signal that does not grow with size.
     """
-    x, y = np.log(np.asarray(size_mm, dtype=float)), np.asarray(hit, dtype=float)
-    _require_overlap(x, y)
-    shift = float(x.mean())
-    design = np.stack([np.ones_like(x), x - shift], axis=1)
-    beta = np.zeros(2)
-    for _ in range(STEPS):
-        p = expit(design @ beta)
-        information = (design * (p * (1 - p))[:, None]).T @ design
-        step = np.linalg.solve(information, design.T @ (y - p))
-        beta = beta + np.clip(step, -2.0, 2.0)
-        if np.abs(step).max() < 1e-10:
-            break
-    if beta[1] <= 0:
-        raise InputError("larger flaws are not found more often here: no POD curve over size. Vary the size more.")
-    b0, b1 = float(beta[0]), float(beta[1])
-    jacobian = np.array([[-1 / b1, b0 / b1**2], [0.0, -1 / b1**2]])
-    covariance = jacobian @ np.linalg.inv(information) @ jacobian.T
-    return PodCurve("hit/miss", shift - b0 / b1, 1 / b1, np.asarray(covariance), len(x))
-
-
-def signal_response(size_mm: Array, signal: Array, *, threshold: float) -> PodCurve:
-    """Fit log(signal) = b0 + b1 log(size) + normal scatter and return the POD at a call level.
-
-    Parameters
-    ----------
-    size_mm : (N,) [mm]
-    signal : (N,) above 0, any unit
-    threshold : call level in the same unit
-
-    Raises
-    ------
-    InputError
-        With fewer than six signals or when signals do not grow with size.
-    """
-    x, y = np.log(np.asarray(size_mm, dtype=float)), np.log(np.asarray(signal, dtype=float))
-    if len(x) < 6 or not np.isfinite(y).all():
-        raise InputError(f"{len(x)} signals (need 6, all above 0) are too few for a POD curve.")
-    design = np.stack([np.ones_like(x), x], axis=1)
-    (b0, b1), *_ = np.linalg.lstsq(design, y, rcond=None)
-    tau2 = float(((y - design @ np.array([b0, b1])) ** 2).sum() / (len(x) - 2))
+    good = np.isfinite(signal) & (signal > 0) & (size_mm > 0)
+    if good.sum() < LEAST_SIZES or np.ptp(np.log(size_mm[good])) < 0.05:
+        raise InputError(
+            f"{int(good.sum())} usable signals at {len(np.unique(size_mm[good]))} sizes are too few for a detection "
+            f"curve (at least {LEAST_SIZES} at several sizes). Add flaws of other sizes."
+        )
+    x, y = np.log(size_mm[good]), np.log(signal[good])
+    design = np.column_stack([np.ones_like(x), x])
+    fit, *_ = np.linalg.lstsq(design, y, rcond=None)
+    b0, b1 = float(fit[0]), float(fit[1])
     if b1 <= 0:
-        raise InputError("signals do not grow with size here: no POD curve over size. Vary the size more.")
-    tau = float(np.sqrt(tau2))
-    mu, sigma = (np.log(threshold) - b0) / b1, tau / b1
-    line = tau2 * np.linalg.inv(design.T @ design)
-    to_mu = np.array([-1 / b1, -mu / b1])
-    to_sigma = np.array([0.0, -sigma / b1])
-    spread = tau2 / (2 * len(x)) / b1**2
-    cross = float(to_mu @ line @ to_sigma)
-    covariance = np.array([[to_mu @ line @ to_mu, cross], [cross, to_sigma @ line @ to_sigma + spread]])
-    return PodCurve("signal", float(mu), float(sigma), covariance, len(x))
+        raise InputError(f"the signal does not grow with size (slope {b1:.2f}); a detection curve needs one that does.")
+    scatter = float(np.sqrt(((y - design @ fit) ** 2).sum() / (len(x) - 2)))
+    mu, sigma = (np.log(threshold) - b0) / b1, scatter / b1
+    spread = scatter**2 * np.linalg.inv(design.T @ design)
+    full = np.zeros((3, 3))
+    full[:2, :2], full[2, 2] = spread, scatter**2 / (2 * len(x))
+    slope = np.array([[-1 / b1, -mu / b1, 0.0], [0.0, -sigma / b1, 1 / b1]])
+    return _curve(float(mu), sigma, slope @ full @ slope.T, "signal against size, delta method", basis)
 
 
-def _require_overlap(x: Array, y: Array) -> None:
-    hits, misses = int(y.sum()), int((1 - y).sum())
-    if min(hits, misses) < LEAST_HITS:
+def pod_from_hits(size_mm: Array, hit: BoolArray, *, basis: str) -> PodCurve:
+    """Fit a cumulative normal of log(size) to hits and misses by maximum likelihood.
+
+    Raises
+    ------
+    InputError
+        Fewer than 20 trials, or hits and misses that do not overlap in size.
+    """
+    hits, misses = size_mm[hit], size_mm[~hit]
+    if len(size_mm) < LEAST_HITS or len(hits) == 0 or len(misses) == 0 or misses.max() <= hits.min():
         raise InputError(
-            f"{hits} hits and {misses} misses: a POD curve needs {LEAST_HITS} of each. Widen the range of sizes."
+            f"{len(hits)} hits and {len(misses)} misses do not fix a detection curve (at least {LEAST_HITS} trials "
+            "with sizes that are found sometimes and missed sometimes). Add sizes near the limit."
         )
-    if x[y > 0].min() >= x[y == 0].max():
-        raise InputError(
-            "every hit is larger than every miss, so the curve's slope has no finite estimate. "
-            "Add cases between the largest miss and the smallest hit."
-        )
+    x = np.log(size_mm)
+
+    def cost(parameters: Array) -> float:
+        z = (x - parameters[0]) / np.exp(parameters[1])
+        return -float(norm.logcdf(np.where(hit, z, -z)).sum())
+
+    start = np.array([float(np.median(x)), np.log(max(float(x.std()), 0.05))])
+    best = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-8})
+    mu, sigma = float(best.x[0]), float(np.exp(best.x[1]))
+    covariance = np.linalg.inv(_hessian(lambda p: cost(np.array([p[0], np.log(p[1])])), np.array([mu, sigma])))
+    return _curve(mu, sigma, covariance, "hit or miss, maximum likelihood", basis)
+
+
+def _curve(mu: float, sigma: float, covariance: Array, method: str, basis: str) -> PodCurve:
+    a90 = mu + Z90 * sigma
+    slope = np.array([1.0, Z90])
+    deviation = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+    a50_mm, a90_mm, a90_95_mm = (float(np.exp(v)) for v in (mu, a90, a90 + Z95 * deviation))
+    return PodCurve(mu, sigma, covariance, a50_mm, a90_mm, a90_95_mm, method, basis)
+
+
+def _hessian(cost: Callable[[Array], float], at: Array) -> Array:
+    step = 1e-3 * np.maximum(np.abs(at), 0.1)
+    out = np.zeros((2, 2))
+    for i in range(2):
+        for j in range(2):
+            a, b = step[i] * np.eye(2)[i], step[j] * np.eye(2)[j]
+            values = [cost(at + s * a + t * b) for s, t in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+            out[i, j] = (values[0] - values[1] - values[2] + values[3]) / (4 * step[i] * step[j])
+    return out
