@@ -10,12 +10,14 @@ from eddyscan.scanning.experiment import StageExperiment, stage_experiment
 from eddyscan.scanning.jog import JogSession, JogState
 from eddyscan.scanning.keep_out import KeepOut
 from eddyscan.scanning.running import run
+from eddyscan.scanning.tilt import TiltHead
 
 __all__ = [
     "JogSession",
     "JogState",
     "KeepOut",
     "StageExperiment",
+    "TiltHead",
     "TouchAlignment",
     "align_from_corner",
     "align_from_points",

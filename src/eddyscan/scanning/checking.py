@@ -13,7 +13,7 @@ from eddyscan.core.plan import KINDS, ScanPlan
 from eddyscan.core.technique import Technique
 from eddyscan.devices.protocols import Axis
 from eddyscan.scanning.keep_out import KeepOut, refuse_keep_out
-from eddyscan.scanning.targets import stage_targets
+from eddyscan.scanning.tilt import TiltHead, axis_targets
 
 
 def check(
@@ -24,6 +24,7 @@ def check(
     *,
     mesh: SurfaceMesh | None = None,
     keep_out: Sequence[KeepOut] = (),
+    head: TiltHead | None = None,
 ) -> None:
     """Refuse a plan that would leave the stage's travel, enter the part or a keep-out zone; nothing moves.
 
@@ -35,6 +36,7 @@ def check(
     technique : Technique
     mesh : the surface [part]; without it the spots below the plan's points stand for it
     keep_out : boxes around clamps and stops [mm, stage]
+    head : the tilt head, when the stage's fourth axis is one
 
     Raises
     ------
@@ -47,10 +49,10 @@ def check(
     T = checked_transform(T_stage_part, "the part's pose on the stage")
     if len(stage_axes) < 3:
         raise TravelError(f"the stage has {len(stage_axes)} axes; a scan needs x, y and z. Check rig.toml.")
-    targets = stage_targets(plan, T)
+    targets, faces = axis_targets(plan, T, len(stage_axes), head)
     _refuse_beyond_travel(plan, targets, stage_axes)
     _refuse_no_room_to_lift(plan, targets, stage_axes, technique)
-    refuse_keep_out(plan, targets, T, probe=technique.probe, boxes=keep_out, mesh=mesh)
+    refuse_keep_out(plan, faces, T, probe=technique.probe, boxes=keep_out, mesh=mesh)
 
 
 def _refuse_no_room_to_lift(plan: ScanPlan, targets: Array, stage_axes: Sequence[Axis], technique: Technique) -> None:
@@ -65,8 +67,8 @@ def _refuse_no_room_to_lift(plan: ScanPlan, targets: Array, stage_axes: Sequence
 
 
 def _refuse_beyond_travel(plan: ScanPlan, targets: Array, stage_axes: Sequence[Axis]) -> None:
-    lower = np.array([axis.lower for axis in stage_axes[:3]])
-    upper = np.array([axis.upper for axis in stage_axes[:3]])
+    lower = np.array([axis.lower for axis in stage_axes])
+    upper = np.array([axis.upper for axis in stage_axes])
     beyond = np.maximum(lower - targets, targets - upper)
     if beyond.max() <= 1e-9:
         return
@@ -74,6 +76,7 @@ def _refuse_beyond_travel(plan: ScanPlan, targets: Array, stage_axes: Sequence[A
     axis, count = stage_axes[k], int((beyond.max(axis=1) > 1e-9).sum())
     raise TravelError(
         f"{count} of {len(targets)} poses lie outside the stage's travel; the worst is {KINDS[plan.kind[index]]} pose "
-        f"{index} (row {plan.row[index]}): {axis.name} = {targets[index, k]:.2f} mm, travel {axis.lower:.2f} to "
-        f"{axis.upper:.2f} mm. Move the part by {beyond.max():.1f} mm along {axis.name}, or inspect less of it."
+        f"{index} (row {plan.row[index]}): {axis.name} = {targets[index, k]:.2f} {axis.unit}, travel "
+        f"{axis.lower:.2f} to {axis.upper:.2f} {axis.unit}. Move the part by {beyond.max():.1f} {axis.unit} along "
+        f"{axis.name}, or inspect less of it."
     )

@@ -178,8 +178,8 @@ class _Stroke:
     def _reading(self, index: int, heard: ImpedanceReading, where: Array, off_mm: float) -> Reading:
         scan = self.scan
         doubtful = off_mm > DOUBTFUL_TOLERANCES * scan.technique.scan.position_tolerance_mm
-        x, y, z = (float(v) for v in where[:3])
-        tx, ty, tz = (float(v) for v in scan.targets[index])
+        x, y, z = (float(v) for v in scan.face_of(where))
+        tx, ty, tz = (float(v) for v in scan.faces[index])
         return Reading(
             row=int(scan.plan.row[index]),
             point=int(scan.plan.point[index]),

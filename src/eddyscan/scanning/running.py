@@ -18,16 +18,18 @@ from eddyscan.scanning.part_watch import PartWatch
 from eddyscan.scanning.rows import scan_in_rows
 from eddyscan.scanning.signals import ended_by_signals
 from eddyscan.scanning.stepping import scan_in_steps
-from eddyscan.scanning.targets import stage_targets, travel_height_mm, with_z
+from eddyscan.scanning.targets import travel_height_mm, with_z
+from eddyscan.scanning.tilt import TiltHead, axis_targets
 
 
 @dataclass
 class Scan:
     """One run of one plan: the values and devices every mode of scanning needs.
 
-    `targets` are the axis readings (N, 3) [mm, stage] of the plan's poses,
-    `height_mm` the z reading at which the probe crosses over the part, `at` the
-    pose where the probe stands (None: elsewhere), `row` the row under way.
+    `targets` are the axis readings (N, n_axes) [mm or deg, stage] of the plan's
+    poses, `faces` their coil faces (N, 3) [mm, stage], `height_mm` the z reading
+    at which the probe crosses over the part, `at` the pose where the probe stands
+    (None: elsewhere), `row` the row under way.
     """
 
     plan: ScanPlan
@@ -37,13 +39,19 @@ class Scan:
     sink: RecordSink
     technique: Technique
     targets: Array
+    faces: Array
     height_mm: float
     began_s: float
     progress: Progress = silent
+    head: TiltHead | None = None
     at: int | None = None
     row: int | None = None
     watch: PartWatch | None = None
     rows_since_watch: int = 0
+
+    def face_of(self, position: Array) -> Array:
+        """Return the coil face (3,) [mm, stage] at axis readings (n_axes,)."""
+        return position[:3] if self.head is None else self.head.face(position)
 
 
 def run(
@@ -58,6 +66,7 @@ def run(
     progress: Progress = silent,
     mesh: SurfaceMesh | None = None,
     keep_out: Sequence[KeepOut] = (),
+    head: TiltHead | None = None,
 ) -> None:
     """Take every reading of the plan that the sink does not hold yet.
 
@@ -71,7 +80,7 @@ def run(
         Readings are durable when its `write` returns; it is left open.
     clock : Clock
         The rig's clock, shared by the stage and the instrument.
-    mesh, keep_out : as for `check`
+    mesh, keep_out, head : as for `check`
 
     Raises
     ------
@@ -80,10 +89,11 @@ def run(
     DeviceError, ScanAborted, KeyboardInterrupt, ...
         After the axes were stopped and the probe lifted; what was read is kept.
     """
-    check(plan, stage.axes(), T_stage_part, technique, mesh=mesh, keep_out=keep_out)
-    targets = stage_targets(plan, checked_transform(T_stage_part, "the part's pose on the stage"))
+    check(plan, stage.axes(), T_stage_part, technique, mesh=mesh, keep_out=keep_out, head=head)
+    T = checked_transform(T_stage_part, "the part's pose on the stage")
+    targets, faces = axis_targets(plan, T, len(stage.axes()), head)
     height = travel_height_mm(targets, stage.axes(), technique)
-    scan = Scan(plan, stage, instrument, clock, sink, technique, targets, height, clock.now(), progress)
+    scan = Scan(plan, stage, instrument, clock, sink, technique, targets, faces, height, clock.now(), progress, head)
     _note_settings(scan, T_stage_part)
     with _always_safe(scan):
         if not stage.is_homed():

@@ -80,8 +80,7 @@ def read_point(scan: Scan, index: int) -> None:
     """Settle, read the impedance and the axes, and make the reading durable."""
     scan.clock.sleep(scan.technique.scan.settle_s)
     heard = scan.instrument.read()
-    position = scan.stage.position()[:3]
-    target = scan.targets[index]
+    position, target = scan.face_of(scan.stage.position()), scan.faces[index]
     flag = heard.flag
     if np.abs(position - target).max() > scan.technique.scan.position_tolerance_mm:
         flag |= POSITION_DOUBTFUL

@@ -1,4 +1,4 @@
-"""From poses on the part to axis readings."""
+"""Heights and axis targets."""
 
 from __future__ import annotations
 
@@ -6,15 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eddyscan.core.frames import Array, apply
-from eddyscan.core.plan import ScanPlan
+from eddyscan.core.frames import Array
 from eddyscan.core.technique import Technique
 from eddyscan.devices.protocols import Axis
-
-
-def stage_targets(plan: ScanPlan, T_stage_part: Array) -> Array:
-    """Return the coil face's axis readings (N, 3) [mm, stage] for every pose of the plan."""
-    return apply(T_stage_part, plan.T_part_probe[:, :3, 3])
 
 
 def travel_height_mm(targets: Array, stage_axes: Sequence[Axis], technique: Technique) -> float:
