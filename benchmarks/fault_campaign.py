@@ -53,7 +53,7 @@ class SteadyInstrument:
 def technique(mode: str) -> Technique:
     base = Technique()
     plan = base.plan.model_copy(update={"pitch_mm": 30.0, "step_mm": 15.0})
-    return base.model_copy(update={"plan": plan, "scan": base.scan.model_copy(update={"mode": mode})})
+    return base.model_copy(update={"plan": plan, "scan": base.scan.model_copy(update={"mode": mode, "watch_rows": 0})})
 
 
 @lru_cache(maxsize=1)

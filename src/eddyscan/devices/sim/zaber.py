@@ -174,8 +174,8 @@ class ZaberSimulator:
             axis.halt(now)
             axis.driver_on = False
         elif fault.kind == "power-cycle":
-            for each in self.axes:
-                each.power_cycle(now)
+            for device in self.devices:
+                device.power_cycle(now)
 
     def _update(self, now: float) -> None:
         for device in self.devices:

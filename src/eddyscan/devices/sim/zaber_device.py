@@ -63,9 +63,16 @@ class Device:
         """Bring all axes up to `now`; return the numbers of those that have just come to rest."""
         self.pvt.update(now)
         rested = [number for number, axis in enumerate(self.axes, 1) if axis.update(now)]
-        if any("FS" in axis.flags for axis in self.axes):
+        if any("FS" in axis.flags or not axis.driver_on for axis in self.axes):
             self.pvt.disable(now)
         return rested
+
+    def power_cycle(self, now: float) -> None:
+        """Forget sequences, alerts and the reference, as when the supply was cut."""
+        self.pvt.disable(now)
+        self.alerts_on = False
+        for axis in self.axes:
+            axis.power_cycle(now)
 
     def busy(self, axis: int) -> bool:
         """Return whether the axis (0: any) moves."""
