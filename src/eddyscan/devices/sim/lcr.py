@@ -15,11 +15,10 @@ from typing import Protocol
 
 from eddyscan.devices.clock import ScaledClock
 from eddyscan.devices.protocols import Clock
-from eddyscan.devices.sim.instrument_physics import real_coil
-from eddyscan.devices.sim.instrument_physics_noise import ReadingNoise
 from eddyscan.devices.sim.instrument_wire import InstrumentServer, LinkLost
-from eddyscan.devices.sim.world_settings import WorldFaults, WorldSettings
-from eddyscan.physics import Conductor, air_inductance_h, impedance_ohm
+from eddyscan.devices.sim.lcr_headers import short_form
+from eddyscan.devices.sim.lcr_still_coil import StillCoil
+from eddyscan.devices.sim.world_settings import WorldFaults
 
 APERTURES = {"SHOR": 1.0, "MED": 88 / 5.6, "LONG": 220 / 5.6}
 OVERLOAD_VALUE = "+9.90000E+37"
@@ -100,7 +99,7 @@ class LcrSimulator:
 
     def _one(self, command: str) -> str | None:
         head, _, value = command.lstrip(":").partition(" ")
-        key = _short_form(head)
+        key = short_form(head)
         if key in self._queries():
             return self._queries()[key]()
         setter = self._setters().get(key)
@@ -227,30 +226,6 @@ class LcrSimulator:
             raise LinkLost
 
 
-class StillCoil:
-    """A coil held over sound metal: what a stand-alone meter is given to measure."""
-
-    def __init__(self, lift_off_mm: float, seed: int = 1) -> None:
-        world = WorldSettings(seed=seed)
-        self._lift_off_mm, self._conductor = lift_off_mm, Conductor.half_space(world.conductivity_ms_m)
-        self._coil = real_coil(world.coil, world.instrument.coil_tolerance, seed)
-        self._noise = ReadingNoise(world.instrument, seed)
-        self._time_s = 0.0
-
-    def read(self, frequency_hz: float, aperture_s: float) -> complex:
-        """Return the impedance [ohm] with the instrument's usual imperfections."""
-        self._time_s += aperture_s
-        z = complex(impedance_ohm(self._coil, self._conductor, frequency_hz, self._lift_off_mm))
-        air = 2j * math.pi * frequency_hz * air_inductance_h(self._coil)
-        return self._noise.apply(z, air, self._time_s, aperture_s)
-
-    def prepare(self, frequency_hz: float) -> None:
-        """Nothing to get ready."""
-
-    def sent(self, impedance_ohm: complex) -> None:
-        """Nobody keeps the truth of a stand-alone meter."""
-
-
 def serve_lcr(port: int, *, lift_off_mm: float = 0.5, speed_factor: float = 1.0) -> None:
     """Run a simulated E4980A with a coil over aluminium until Ctrl-C; prints where it listens."""
     meter = LcrSimulator(StillCoil(lift_off_mm), ScaledClock(speed_factor))
@@ -265,22 +240,3 @@ def serve_lcr(port: int, *, lift_off_mm: float = 0.5, speed_factor: float = 1.0)
         print("stopped", flush=True)
     finally:
         meter.close()
-
-
-def _short_form(head: str) -> str:
-    """Return a header in short upper-case form, default nodes left out: FREQuency:CW? -> FREQ?."""
-    query = head.endswith("?")
-    words = [word for word in head.rstrip("?").upper().split(":") if word]
-    short = [_short_word(word) for word in words]
-    for tail in (["CW"], ["LEV"], ["TYPE"], ["IMM"], ["DATA"], ["ASC"], ["NEXT"]):
-        if len(short) > 1 and short[-1:] == tail:
-            short = short[:-1]
-    if short[:2] == ["FETC", "IMP"]:
-        short = ["FETC"]
-    return ":".join(short) + ("?" if query else "")
-
-
-def _short_word(word: str) -> str:
-    if word.startswith("*") or len(word) <= 4:
-        return word
-    return word[:3] if word[3] in "AEIOU" else word[:4]

@@ -127,19 +127,12 @@ def indication_truth(
     facts = facts_of(world)
     T_part_surface = surface_pose(facts.part, mesh)
     near = [_nearest_flaw(facts.flaws, apply(T_part_surface, np.array([i.centre_mm]))[0]) for i in indications]
-    feet = None
-    if log is not None:
-        feet = np.asarray(log["foot_mm"], dtype=float).reshape(-1, 3)
-        over = np.array([body == "part" for body in log.get("body", ["part"] * len(feet))], dtype=bool)
-        feet[~over] = np.inf
-        if record is not None:
-            found = match_readings(log, record)
-            feet = feet[found[found >= 0]]
+    feet = _feet(log, record)
     each = []
     for number, flaw in enumerate(facts.flaws):
         mine = [i for i, nearest in zip(indications, near, strict=True) if nearest == number]
         each.append(flaw.as_dict() | {"found": bool(mine), "indications": [i.number for i in mine]})
-        if feet is not None and len(feet):
+        if len(feet):
             nearest_mm = float(np.linalg.norm(feet - flaw.centre_mm, axis=1).min())
             each[-1]["nearest_reading_mm"] = round(nearest_mm, 3)
     return {
@@ -222,6 +215,19 @@ def _alignment(log: Mapping[str, Any], record: ScanRecord) -> dict[str, float]:
     shift = apply(T_believed, middle) - apply(T_true, middle)
     turn = angle_deg(invert(T_true) @ T_believed)
     return {"shift_mm": round(float(np.linalg.norm(shift)), 4), "turn_deg": round(turn, 4)}
+
+
+def _feet(log: Mapping[str, Any] | None, record: ScanRecord | None) -> Array:
+    """Return the spots below the readings on the part (N, 3) [mm, part], those of the record alone when it is given."""
+    if log is None:
+        return np.empty((0, 3))
+    feet = np.asarray(log["foot_mm"], dtype=float).reshape(-1, 3)
+    over = np.array([body == "part" for body in log.get("body", ["part"] * len(feet))], dtype=bool)
+    if record is None:
+        return np.asarray(feet[over])
+    places = match_readings(log, record)
+    places = places[places >= 0]
+    return np.asarray(feet[places[over[places]]])
 
 
 def _nearest_flaw(flaws: tuple[Flaw, ...], at: Array) -> int | None:
