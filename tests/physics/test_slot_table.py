@@ -52,7 +52,7 @@ def test_a_damaged_table_is_computed_again(tmp_path):
 
 
 def test_beyond_the_table_is_an_error_that_names_place_value_and_range(table):
-    with pytest.raises(TechniqueError, match=r"position 1 of 2 .*\|x_mm\| = 9 \(allowed 0 to 6\.3\)"):
+    with pytest.raises(TechniqueError, match=r"position 1 of 2 .*\|x_mm\| = 9 \(allowed 0 to 5\.25\)"):
         table.change_ohm([0.0, -9.0], 0.0, 0.1)
     with pytest.raises(TechniqueError, match=r"lift_off_mm = 5 \(allowed 0 to 3\)"):
         table.change_ohm(0.0, 0.0, 5.0)

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from eddyscan.core.frames import Array, ComplexArray
+from eddyscan.core.frames import Array, BoolArray, ComplexArray
 from eddyscan.physics.metal import DepthProfile, SlottedMetal
 
 
@@ -24,6 +24,10 @@ class SlotBasis(Protocol):
     @property
     def size(self) -> int:
         """Number of unknowns."""
+
+    @property
+    def odd(self) -> BoolArray:
+        """Which functions are odd along the slot (size,)."""
 
     @property
     def highest_order(self) -> int:

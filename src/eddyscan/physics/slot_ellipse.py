@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import eval_jacobi, gammaln
 
-from eddyscan.core.frames import Array, ComplexArray, IntArray
+from eddyscan.core.frames import Array, BoolArray, ComplexArray, IntArray
 from eddyscan.physics.bessel_rules import product_rule
 from eddyscan.physics.metal import DepthProfile, SlottedMetal
 from eddyscan.physics.quadrature import gauss_panels
@@ -45,6 +45,11 @@ class EllipseBasis:
     def size(self) -> int:
         """Number of unknowns."""
         return len(self.orders[0])
+
+    @property
+    def odd(self) -> BoolArray:
+        """Which functions are odd along the slot (size,)."""
+        return np.asarray(self.orders[0] % 2 == 1)
 
     @property
     def highest_order(self) -> int:
@@ -97,7 +102,7 @@ class EllipseBasis:
         edges = lowest * 2.0 ** np.arange(np.log2(80 / shortest / lowest) + 1)
         kappa, wk = gauss_panels(np.concatenate([[0.0], edges]), 7)
         x, z, weighted = self._area_rule(24 + self.degree + int(0.6 * HIGHEST_LINE_PHASE))
-        odd = self.orders[0] % 2 == 1
+        odd = self.odd
         total = np.zeros((self.size, self.size), dtype=np.complex128)
         for one, share in zip(kappa, wk, strict=True):
             phi, wphi = _directions(one * c)

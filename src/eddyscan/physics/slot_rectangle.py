@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from eddyscan.core.frames import Array, ComplexArray, IntArray
+from eddyscan.core.frames import Array, BoolArray, ComplexArray, IntArray
 from eddyscan.physics.bessel_rules import ProductRule, product_rule
 from eddyscan.physics.metal import DepthProfile, SlottedMetal
 from eddyscan.physics.quadrature import gauss_panels
@@ -108,6 +108,11 @@ class RectangleBasis:
         z = -self.depth_m * np.cos(theta)
         functions = np.sin(np.outer(2 * np.arange(self.down) + 1, theta)) * np.sin(theta) * weight * self.depth_m
         return np.asarray(profile.values(z) @ functions.T)
+
+    @property
+    def odd(self) -> BoolArray:
+        """Which functions are odd along the slot (size,)."""
+        return np.repeat(np.arange(self.along) % 2 == 1, self.down)
 
     @property
     def highest_order(self) -> int:

@@ -47,6 +47,7 @@ class SlotSolver:
         winding radius of the smallest coil to be used.
     functions : (int, int) or None
         Functions along and down the slot, for convergence checks; chosen when None.
+        A semi-elliptic slot takes the larger as its degree.
 
     Raises
     ------
@@ -70,7 +71,9 @@ class SlotSolver:
         self._coating_m = coating_mm * MM
         self.metal = SlottedMetal(layer, below, frequency_hz, slot.opening_m)
         self.basis = slot_basis(slot, self.metal, detail_mm * MM, functions)
-        self._inverse = inv(self.basis.matrix(self.metal))
+        matrix = self.basis.matrix(self.metal)
+        odd = self.basis.odd
+        self._blocks = [(which, inv(matrix[np.ix_(which, which)])) for which in map(np.flatnonzero, (~odd, odd))]
 
     def coil(self, coil: Coil, *, reach_mm: float, lift_off_mm: Array, samples: int = 0) -> CoilOnSlot:
         """Prepare a coil for positions within `reach_mm` of every slot point and lift-offs (H,) [mm]."""
@@ -80,9 +83,10 @@ class SlotSolver:
 
     def reaction_ohm(self, receiver: Drive, driver: Drive) -> ComplexArray:
         """Return b'^T A^-1 b plus the along-slot term (P, H) [ohm] of two drives at the same positions."""
-        solved = driver.across.reshape(-1, self.basis.size) @ self._inverse
-        across = np.einsum("ij,ij->i", solved, receiver.across.reshape(-1, self.basis.size))
-        total = across.reshape(driver.across.shape[:2])
+        total = np.zeros(driver.across.shape[:2], dtype=np.complex128)
+        for which, inverse in self._blocks:  # even and odd functions along the slot do not react
+            one, other = driver.across[..., which], receiver.across[..., which]
+            total += np.einsum("phi,phi->ph", one @ inverse, other)
         if receiver.along.shape[2] and driver.along.shape[2]:
             total = total + np.einsum("phq,phq->ph", receiver.along, driver.along)
         return np.asarray(total)

@@ -39,13 +39,13 @@ class TableGrid:
 def table_grid(
     slot: Slot, coil: Coil, *, max_lift_off_mm: float | None = None, counts: tuple[int, int, int] | None = None
 ) -> TableGrid:
-    """Return the usual grid: 3.2 outer radii beyond the slot, to 2 outer radii of lift-off (or as told)."""
+    """Return the usual grid: 2.5 outer radii beyond the slot, to 2 outer radii of lift-off (or as told)."""
     mean = 0.5 * (coil.inner_radius_mm + coil.outer_radius_mm)
-    beside = 3.2 * coil.outer_radius_mm
+    beside = 2.5 * coil.outer_radius_mm
     along = 0.5 * slot.length_mm + beside
     high = 2 * coil.outer_radius_mm if max_lift_off_mm is None else max_lift_off_mm
     checks.positive("max_lift_off_mm", high, unit="mm")
-    nx, ny, nh = counts or (max(41, int(along / (0.15 * mean)) + 1), 41, 16)
+    nx, ny, nh = counts or (max(33, int(along / (0.15 * mean)) + 1), 33, 15)
     scale = 0.6 * mean
     heights = scale * np.expm1(np.linspace(0.0, np.log1p(high / scale), nh))
     heights[-1] = high
@@ -208,8 +208,9 @@ def _read(path: Path, text: str) -> ComplexArray | None:
 def _keep(path: Path, text: str, values: ComplexArray) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            part = Path(folder) / path.name
             np.savez(part, values=values, inputs=np.array(text))
-        os.replace(part.name, path)
+            os.replace(part, path)
     except OSError:
         return
