@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 
 from eddyscan import __version__
-from eddyscan.cli import devices, folder, studies, tools
+from eddyscan.cli import devices, folder, jog, studies, tools
 from eddyscan.cli.terminal import say
 from eddyscan.core.errors import EddyscanError
 
@@ -35,7 +35,7 @@ def _options(
     """Take the options that stand before a command."""
 
 
-for module in (folder, tools, devices, studies):
+for module in (folder, jog, tools, devices, studies):
     module.register(app)
 
 

@@ -11,6 +11,7 @@ from eddyscan.pipeline.files import (
     surface_from_views,
     surface_settings,
 )
+from eddyscan.pipeline.jogging import jog_session, keep_touched
 from eddyscan.pipeline.line import demo, new_inspection, run, single_step, states
 from eddyscan.pipeline.signals import signal, signal_table
 from eddyscan.pipeline.simulated import simulators
@@ -19,6 +20,8 @@ __all__ = [
     "compare_meshes",
     "demo",
     "export",
+    "jog_session",
+    "keep_touched",
     "new_inspection",
     "plan_on_mesh",
     "plan_rows",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from eddyscan.devices.rig import Rig
 
 FILE = "alignment.json"
+TOUCHED = "alignment.json"  # in the inspection folder itself: what the operator jogged to
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,12 @@ def kept_placing(inspection: Inspection) -> Placing | None:
     return Placing(checked_transform(details["T_stage_part"], str(path)), float(details.get("scale", 1.0)), details)
 
 
-def operators_placing(rig: Rig, mesh: SurfaceMesh) -> Placing:
-    """Return the placing as rig.toml or the operator's jog to the corner gives it; nothing moves."""
+def operators_placing(inspection: Inspection, rig: Rig, mesh: SurfaceMesh) -> Placing:
+    """Return the placing as `eddyscan jog`, rig.toml or the virtual operator gives it; nothing moves."""
+    touched = inspection.folder / TOUCHED
+    if touched.is_file():
+        details = read_json(touched)
+        return Placing(checked_transform(details["T_stage_part"], str(touched)), 1.0, details)
     T_stage_part, how = rig.alignment(mesh)
     return Placing(T_stage_part, 1.0, {"T_stage_part": np.asarray(T_stage_part).tolist(), "how": how})
 
@@ -70,7 +75,7 @@ def measured_placing(
     from eddyscan.scanning.field_alignment import align
     from eddyscan.scanning.field_motion import FieldProbe
 
-    corner = operators_placing(rig, mesh)
+    corner = operators_placing(inspection, rig, mesh)
     if technique.scan.alignment == "field":
         found = align(
             mesh,

@@ -36,7 +36,7 @@ def scan_plan(
     plan = read_plan(inspection.file("plan", "plan.json"))
     mesh = read_mesh(inspection.file("surface", "surface.ply"))
     if dry_run:
-        placing = kept_placing(inspection) or operators_placing(rig, mesh)
+        placing = kept_placing(inspection) or operators_placing(inspection, rig, mesh)
         check(placing.plan(plan), rig.stage.axes(), placing.T_stage_part, technique, mesh=placing.mesh(mesh))
         return
     started, folder = datetime.now(UTC), inspection.step_folder("record")

@@ -30,7 +30,8 @@ def inputs_of(inspection: Inspection, step: str) -> dict[str, str]:
             settings = {name: getattr(technique, name).model_dump(mode="json") for name in ("plan", "probe", "scan")}
             return _output(inspection, "surface") | {"technique.toml [plan, probe, scan]": sha256_of_value(settings)}
         case "record":
-            return _output(inspection, "plan")
+            touched = inspection.folder / "alignment.json"
+            return _output(inspection, "plan") | ({touched.name: sha256_of(touched)} if touched.is_file() else {})
         case "cscan":
             settings = {
                 name: getattr(technique, name).model_dump(mode="json")
