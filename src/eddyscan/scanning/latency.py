@@ -27,6 +27,8 @@ LINE_MM = 2.0
 LARGEST_S = 0.15
 LARGEST_UNCERTAINTY_S = 0.004
 DEGREE = 6
+TRIAL_S, TRIAL_MM = 2e-4, 2e-4
+LEAST_EXPLAINED = 0.3  # a curve that leaves more of the signal's variation unexplained is no curve
 SPEED_SHARES = (1.0, 0.4)  # two speeds tell a delay from backlash
 DIRECTION_S = 0.01
 
@@ -56,7 +58,7 @@ def measure_latency(scan: Scan, mode: str) -> Latency:
             _drive_line(scan, mode, path, (times, values, looks))
     t, z = np.array([look[0] for look in looks]), np.array([look[1] for look in looks])
     latency = fit_latency(np.array(times), np.array(values), t, z)
-    if not latency.uncertainty_s < LARGEST_UNCERTAINTY_S:
+    if not latency.uncertainty_s <= LARGEST_UNCERTAINTY_S:
         raise WorkError(
             f"the delay between readings and positions came out as {1e3 * latency.seconds:.1f} ms with an uncertainty "
             f"of {1e3 * latency.uncertainty_s:.1f} ms (limit {1e3 * LARGEST_UNCERTAINTY_S:.0f}) from "
@@ -116,11 +118,18 @@ def fit_latency(times_s: Array, values: ComplexArray, position_times_s: Array, p
 
     coarse = np.linspace(-LARGEST_S, LARGEST_S, 61)
     best = float(coarse[int(np.argmin([(misfit(np.array([d, 0.0])) ** 2).sum() for d in coarse]))])
-    found = least_squares(misfit, [best, 0.0], x_scale=[1e-3, 1e-3], diff_step=[1e-2, 1e-2])
+
+    def slopes(unknown: Array) -> Array:
+        steps = np.diag([TRIAL_S, TRIAL_MM])
+        return np.stack([(misfit(unknown + h) - misfit(unknown - h)) / (2 * h.sum()) for h in steps], axis=1)
+
+    found = least_squares(misfit, [best, 0.0], jac=slopes, x_scale=[1e-3, 1e-3])
     jacobian = np.asarray(found.jac)
     spread = found.fun.size - 2 * (DEGREE + 1) - 2
     information = np.asarray(jacobian.T @ jacobian)
-    if spread <= 0 or np.linalg.det(information) <= 0:
+    left = float((found.fun**2).sum())
+    varied = float(((parts - parts.mean(axis=0)) ** 2).sum())
+    if spread <= 0 or left > LEAST_EXPLAINED * varied or np.linalg.det(information) <= 0:
         return Latency(float(found.x[0]), float("inf"), 0.0, len(times_s))
-    covariance = np.linalg.inv(information) * float((found.fun**2).sum()) / spread
+    covariance = np.linalg.inv(information) * left / spread
     return Latency(float(found.x[0]), float(np.sqrt(covariance[0, 0])), float(found.x[1]), len(times_s))
