@@ -109,7 +109,7 @@ def pod_from_hits(size_mm: Array, hit: BoolArray, *, basis: str) -> PodCurve:
     best = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-8})
     mu, sigma = float(best.x[0]), float(np.exp(best.x[1]))
     covariance = np.linalg.inv(_hessian(lambda p: cost(np.array([p[0], np.log(p[1])])), np.array([mu, sigma])))
-    return _curve(mu, sigma, covariance, "hit or miss, maximum likelihood", basis)
+    return _curve(mu, sigma, np.asarray(covariance), "hit or miss, maximum likelihood", basis)
 
 
 def _curve(mu: float, sigma: float, covariance: Array, method: str, basis: str) -> PodCurve:
