@@ -73,7 +73,8 @@ def compare_scans(a: AnalysisResult, b: AnalysisResult, *, near_mm: float = 3.0)
     if overlap < LEAST_OVERLAP:
         raise InputError(
             f"the two inspections share {100 * overlap:.0f} % of the covered surface (at least "
-            f"{100 * LEAST_OVERLAP:.0f} % is needed); the surfaces fit to {misfit:.2f} mm. Are they of the same part, the same way round?"
+            f"{100 * LEAST_OVERLAP:.0f} % is needed); the surfaces fit to {misfit:.2f} mm. "
+            "Are they of the same part, the same way round?"
         )
     shared = sorted(set(a.cscan.channels) & set(b.cscan.channels))
     change = {k: np.where(both, b.cscan.channels[k][nearest] - a.cscan.channels[k], np.nan) for k in shared}
