@@ -24,7 +24,7 @@ def meter_on_wire(coil=None, **options):
 
 
 def driver_for(address, clock, **settings):
-    return KeysightE4980A(KeysightE4980ASettings(address=address, timeout_s=1.0, **settings), clock)
+    return KeysightE4980A(KeysightE4980ASettings(address=address, **{"timeout_s": 8.0} | settings), clock)
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def test_every_so_many_readings_overload_when_the_world_says_so():
 
 def test_lost_link_names_the_address_and_the_way_out():
     simulator, clock, address = meter_on_wire(faults=WorldFaults(lcr_link_lost_after=2))
-    driver = driver_for(address, clock)
+    driver = driver_for(address, clock, timeout_s=1.0)
     driver.configure(DRIVE)
     driver.read()
     driver.read()
@@ -99,7 +99,7 @@ def test_lost_link_names_the_address_and_the_way_out():
 
 def test_silent_meter_is_given_up_after_its_timeout():
     simulator, clock, address = meter_on_wire(faults=WorldFaults(lcr_silent_after=1))
-    driver = driver_for(address, clock)
+    driver = driver_for(address, clock, timeout_s=1.0)
     driver.configure(DRIVE)
     driver.read()
     with pytest.raises(LinkError, match="failed to read"):

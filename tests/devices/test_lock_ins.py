@@ -23,7 +23,7 @@ class Wire:
         address = f"TCPIP::{host}::{port}::SOCKET"
         self.driver = None
         try:
-            self.driver = DRIVERS[model](LockInSettings(address=address, timeout_s=1.0, **settings), self.clock)
+            self.driver = DRIVERS[model](LockInSettings(address=address, **{"timeout_s": 8.0} | settings), self.clock)
         except BaseException:
             self.simulator.close()
             raise
@@ -100,7 +100,7 @@ def test_reading_before_configure_is_refused(model):
 
 
 def test_lost_link(model):
-    with Wire(model, faults=WorldFaults(lcr_link_lost_after=1)) as wire:
+    with Wire(model, faults=WorldFaults(lcr_link_lost_after=1), timeout_s=1.0) as wire:
         wire.driver.configure(DRIVE)
         wire.driver.read()
         with pytest.raises(LinkError, match="failed to read"):

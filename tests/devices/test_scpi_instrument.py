@@ -27,7 +27,7 @@ form = "ohm"
 status_index = 2
 overload_status = [1]
 range_hz = [20, 2e6]
-timeout_s = 1.0
+timeout_s = 8.0
 """
 
 
