@@ -14,8 +14,10 @@ from eddyscan.planning.heights import HeightMap
 from eddyscan.planning.probe_pose import vertical_stance
 from eddyscan.planning.smooth import tangents_of
 
-MOST_CHECKED = 3000
-BODY_RINGS, BODY_ANGLES = 4, 8
+MOST_CHECKED = 1500
+BODY_RINGS, BODY_ANGLES = 5, 6
+# What enters a part passes its skin: only spots near it are asked, a ring every few mm.
+NEAR_MM = 8.0
 # Nearer than this to the skin of the mesh is contact, not penetration.
 TOUCH_MM = 0.3
 
@@ -69,9 +71,11 @@ class AxialAccess:
         x, y, z = self.skeleton.T
         spots = p[:, None] + x[:, None] * t[:, None, 0] + y[:, None] * t[:, None, 1] + z[:, None] * n[:, None]
         flat = spots.reshape(-1, 3)
-        _, near = self.tree.query(flat)
+        distance, near = self.tree.query(flat, distance_upper_bound=NEAR_MM)
+        close = np.isfinite(distance)
+        near = np.where(close, near, 0)
         depth = np.einsum("nk,nk->n", flat - self.mesh.vertices[near], self.mesh.normals[near])
-        hit = depth < -TOUCH_MM
+        hit = close & (depth < -TOUCH_MM)
         if self.table_z_mm is not None:
             hit |= flat[:, 2] < self.table_z_mm
         clear = ~hit.reshape(len(checked), -1).any(axis=1)

@@ -47,7 +47,7 @@ def assembled(
         "tilt_deg": tilt,
         "lift_off_mm": lift,
         "speed_mm_s": speed,
-        "time_s": arrival_times(route.face_mm, speed, scan, technique.scan.settle_s, motion),
+        "time_s": arrival_times(route.face_mm, speed, scan, technique.scan, motion),
     }
 
 

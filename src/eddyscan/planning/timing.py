@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eddyscan.core.frames import Array, BoolArray
+from eddyscan.core.technique import Scan
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ def move_times(positions: Array, speed_mm_s: Array, limits: MotionLimits) -> Arr
     length = np.linalg.norm(step, axis=1)
     share = step / np.maximum(length, 1e-12)[:, None]
     with np.errstate(divide="ignore"):
-        v = np.minimum((np.asarray(limits.speed_mm_s) / share).min(axis=1), speed_mm_s[1:])
         a = (np.asarray(limits.acceleration_mm_s2) / share).min(axis=1)
+    v = _path_speed(positions, speed_mm_s, limits)
     finite = length > 1e-9
     v, a = np.where(finite, v, 1.0), np.where(finite, a, 1.0)
     cruise = length >= v * v / a
@@ -45,10 +46,32 @@ def move_times(positions: Array, speed_mm_s: Array, limits: MotionLimits) -> Arr
     return np.asarray(np.where(finite, time, 0.0))
 
 
-def arrival_times(
-    positions: Array, speed_mm_s: Array, reads: BoolArray, settle_s: float, limits: MotionLimits
-) -> Array:
-    """Return the time (N,) [s] at which each pose is reached in step-and-read motion, 0 at the first."""
+def arrival_times(positions: Array, speed_mm_s: Array, in_row: BoolArray, scan: Scan, limits: MotionLimits) -> Array:
+    """Return the time (N,) [s] at which each pose is reached, 0 at the first.
+
+    Parameters
+    ----------
+    positions : (N, 3) [mm], speed_mm_s : (N,) on the way to each
+    in_row : (N,) bool, where readings are taken
+    scan : Scan
+        Step mode stops, settles and reads at every reading; the others run
+        through a row at constant speed between a start and a stop.
+    """
     moving = move_times(positions, speed_mm_s, limits) + limits.command_s
-    stay = np.where(reads, settle_s + limits.reading_s, 0.0)
-    return np.concatenate([[0.0], np.cumsum(moving + stay[:-1])])
+    if scan.mode == "step":
+        stay = np.where(in_row, scan.settle_s + limits.reading_s, 0.0)
+        return np.concatenate([[0.0], np.cumsum(moving + stay[:-1])])
+    flying = in_row[1:] & in_row[:-1]
+    starts, stops = flying & ~np.append(False, flying[:-1]), flying & ~np.append(flying[1:], False)
+    length = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    v = _path_speed(positions, speed_mm_s, limits)
+    ramp = 0.5 * v / float(np.min(limits.acceleration_mm_s2)) * (starts.astype(float) + stops.astype(float))
+    return np.concatenate([[0.0], np.cumsum(np.where(flying, length / v + ramp, moving))])
+
+
+def _path_speed(positions: Array, speed_mm_s: Array, limits: MotionLimits) -> Array:
+    """Return the speed (N - 1,) [mm/s] along each straight way that no axis exceeds."""
+    step = np.abs(np.diff(positions, axis=0))
+    share = step / np.maximum(np.linalg.norm(step, axis=1), 1e-12)[:, None]
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.minimum((np.asarray(limits.speed_mm_s) / share).min(axis=1), speed_mm_s[1:]))

@@ -130,7 +130,7 @@ def spacings(strokes: list[Stroke]) -> Array:
     return np.concatenate(parts)
 
 
-def row_distances(strokes: list[Stroke], pitch_mm: float, *, probes: int = 4000) -> Array:
+def row_distances(strokes: list[Stroke], pitch_mm: float, *, probes: int = 2000) -> Array:
     """Return distances [mm] from spots along rows to the next strand on either side.
 
     A strand counts where it is seen within 30 degrees of straight across.
