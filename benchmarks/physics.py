@@ -207,7 +207,7 @@ def speed_lines() -> list[Line]:
     grid = table_grid(CRACK, PENCIL, counts=(41, 41, 12))
     table = build_table(CRACK, PENCIL, ALUMINIUM, 5e5, grid=grid)
     rng = np.random.default_rng(SEED)
-    x, y, h = rng.uniform(-5, 5, 100_000), rng.uniform(-4, 4, 100_000), rng.uniform(0, 2.5, 100_000)
+    x, y, h = rng.uniform(-5, 5, 100_000), rng.uniform(-3.7, 3.7, 100_000), rng.uniform(0, 2.5, 100_000)
     curve = LiftOffCurve(PENCIL, ALUMINIUM, 5e5)
     readings = curve.impedance_ohm(h)
     jobs: list[tuple[str, float, Callable[[], object]]] = [

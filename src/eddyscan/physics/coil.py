@@ -129,12 +129,17 @@ def air_inductance_h(coil: Coil) -> float:
     """Return the inductance [H] of the coil alone in air.
 
     Dodd and Deeds (1968), their eq. for the coil in air:
-    L0 = 2 pi mu0 i^2 integral of R(k)^2 / k^2 (k l + exp(-k l) - 1) dk.
+    L0 = 2 pi mu0 i^2 integral of R(k)^2 / k^2 (k l + exp(-k l) - 1) dk. Beyond the last
+    node R^2 is replaced by its mean, which leaves 1e-8.
     """
-    step = 5.0 / coil.outer_m
-    linear = np.arange(2.0 * step, max(400.0 / coil.inner_m, 400.0 / coil.length_m), step)
+    r1, r2, length = coil.inner_m, coil.outer_m, coil.length_m
+    step = 5.0 / r2
+    top = max(150.0 / coil.mean_radius_m, min(max(20.0 / length, 20.0 / (r2 - r1)), 4000.0 / coil.mean_radius_m))
+    linear = np.arange(2.0 * step, top + step, step)
     k, w = gauss_panels(np.concatenate([[0.0], step * 2.0 ** np.arange(-16, 1), linear]), 12)
-    kl = k * coil.length_m
+    kl = k * length
     axial = np.where(kl < 1e-3, 0.5 * kl**2 - kl**3 / 6 + kl**4 / 24, kl + np.expm1(-kl))
     spectrum = winding_integral(coil, k) ** 2 / k**2 * axial
-    return float(2 * np.pi * MU0 * coil.turn_density**2 * (w @ spectrum))
+    last = float(linear[-1])
+    tail = (r1 + r2) / np.pi * (length / (3 * last**3) - 1 / (4 * last**4))  # R^2 -> (r1 + r2) / (pi k^3) on average
+    return float(2 * np.pi * MU0 * coil.turn_density**2 * (w @ spectrum + tail))
