@@ -85,6 +85,16 @@ def fine() -> list[str]:
     return rows
 
 
+def on_the_wall_clock() -> list[str]:
+    """Drive two rows of block-c at life speed: what the computer's own hesitation adds."""
+    rows = []
+    for mode, limit in (("row", 60), ("pvt", 30)):
+        outcome = scan_block("block-c", mode, rows=2, clock=WallClock())
+        measured = f"{outcome.z_following_um():.1f} um, smear {outcome.smear_mm():.3f} mm, {told(outcome)}"
+        rows.append(line(f"block-c, 2 rows on the wall clock, {mode}: z off the path", f"<= {limit} um", measured))
+    return rows
+
+
 def overhead_ms(points: int = 60) -> tuple[float, float]:
     """Return (scan loop's overhead per stepped point, part of it spent on the wire) [ms], medians on wall time.
 
@@ -131,7 +141,9 @@ def _home_at_once(simulator: ZaberSimulator) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--fine", action="store_true", help="also the 1 mm raster: 20 000 readings, some minutes")
+    parser.add_argument(
+        "--fine", action="store_true", help="also the 1 mm raster (20 000 readings) and rows at life speed"
+    )
     parser.add_argument("--write", action="store_true", help="write the section of docs/validation.md")
     given = parser.parse_args()
     from zaber_motion import Library
@@ -143,6 +155,7 @@ def main() -> None:
             *coarse(),
             *(fine() if given.fine else []),
             *steep(),
+            *(on_the_wall_clock() if given.fine else []),
             line(
                 "overhead per stepped point over the stage's own time",
                 "<= 5 ms",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -131,6 +131,13 @@ def lower_bound_s(plan: ScanPlan, acceleration_mm_s2: float) -> float:
     return rows + sum(turns)
 
 
+def first_rows(plan: ScanPlan, rows: int) -> ScanPlan:
+    """Return the plan's first rows with the poses that lead to them."""
+    keep = plan.row < rows
+    arrays = {f.name: getattr(plan, f.name) for f in fields(plan) if isinstance(getattr(plan, f.name), np.ndarray)}
+    return replace(plan, **{name: values[keep] for name, values in arrays.items()})
+
+
 def scan_block(
     part: str,
     mode: str,
@@ -140,6 +147,7 @@ def scan_block(
     clock: Clock | None = None,
     reply_delay_s: float = 0.001,
     acceleration: float = 200.0,
+    rows: int | None = None,
     seed: int = 1,
 ) -> Outcome:
     """Scan a block in "step" or "row" on the study's chain, in "pvt" on a multi-axis controller."""
@@ -156,6 +164,8 @@ def scan_block(
     stage = ZaberStage(ZaberStageSettings(host=host, port=port, axes=wired, dead_man=False), clock)
     given = technique(mode, step_mm, margin_mm)
     plan = make_plan(named_part(part).top_mesh(1.0), given)
+    if rows is not None:
+        plan = first_rows(plan, rows)
     instrument, sink = LiftOffInstrument(clock, simulator, part, seed), MemorySink()
     try:
         stage.home()

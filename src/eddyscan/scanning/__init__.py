@@ -6,6 +6,7 @@ protocols, never a driver or a simulator.
 
 from eddyscan.scanning.alignment import TouchAlignment, align_from_corner, align_from_points
 from eddyscan.scanning.checking import check
+from eddyscan.scanning.dry_run import what_would_move
 from eddyscan.scanning.experiment import StageExperiment, stage_experiment
 from eddyscan.scanning.jog import JogSession, JogState
 from eddyscan.scanning.keep_out import KeepOut
@@ -24,4 +25,5 @@ __all__ = [
     "check",
     "run",
     "stage_experiment",
+    "what_would_move",
 ]
