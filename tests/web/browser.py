@@ -119,7 +119,7 @@ class Hand:
             chain.move_by_offset(round(by[0] / 4), round(by[1] / 4))
         chain.release().perform()
 
-    def wait(self, good: Callable[[], Any], seconds: float = 20.0, what: str = "") -> Any:
+    def wait(self, good: Callable[[], Any], seconds: float = 20.0, what: Any = "") -> Any:
         from selenium.common.exceptions import JavascriptException, StaleElementReferenceException
 
         until = time.monotonic() + seconds
@@ -128,7 +128,7 @@ class Hand:
                 if value := good():
                     return value
             time.sleep(0.05)
-        complaint = f"not within {seconds} s: {what or good}; messages: {self.messages()}"
+        complaint = f"not within {seconds} s: {what() if callable(what) else what or good}; says: {self.messages()}"
         if PICTURES:
             self.driver.save_screenshot("/tmp/page-failed.png")
         raise AssertionError(complaint)
@@ -142,9 +142,11 @@ class Hand:
     def job_is(self, step: str, *states: str, seconds: float = 20.0) -> None:
         def there() -> bool:
             job = self.job()
+            if job.get("step") == step and job.get("state") == "failed" and "failed" not in states:
+                raise AssertionError(f"{step} failed: {job.get('message')}")
             return job.get("step") == step and job.get("state") in states
 
-        self.wait(there, seconds, f"{step} {states}; is {self.job()}")
+        self.wait(there, seconds, lambda: f"{step} {states}; is {self.job()}")
 
     def picture(self, name: str) -> None:
         """Keep a screenshot for the walk-through when EDDYSCAN_PICTURES names a folder."""

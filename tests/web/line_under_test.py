@@ -60,7 +60,14 @@ def _scan(inspection: Inspection, progress: Any, control: ScanControl, how: dict
     write_json(folder / "inputs.json", inputs_of(inspection, "record"))
     control.attach(PretendStage(inspection.folder))
     keys = _points(inspection, how)
-    sink = WatchedSink(SqliteRecord(folder / "record.sqlite"), control)
+    for number in range(how.get("passes", 1)):
+        sink = WatchedSink(SqliteRecord(folder / "record.sqlite", scan_pass=number), control)
+        _follow(keys, sink, progress, control, how)
+    write_step_note(folder, inputs_of(inspection, "record"), started)
+    return {}
+
+
+def _follow(keys: list[Any], sink: WatchedSink, progress: Any, control: ScanControl, how: dict[str, Any]) -> None:
     done = sink.done()
     left = [(number, *key) for number, key in enumerate(keys) if key[:2] not in done]
     batch = how.get("batch", 1)
@@ -73,8 +80,6 @@ def _scan(inspection: Inspection, progress: Any, control: ScanControl, how: dict
             time.sleep(how.get("interval_s", 0.005))
     finally:
         sink.close()
-    write_step_note(folder, inputs_of(inspection, "record"), started)
-    return {}
 
 
 def _points(inspection: Inspection, how: dict[str, Any]) -> list[tuple[int, int, np.ndarray]]:

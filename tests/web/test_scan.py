@@ -207,3 +207,20 @@ def test_job_is_told_by_folder_and_reading_count_by_the_overview(served, inspect
     assert steps["record"]["figure"] == "100 of 100 readings"
     assert steps["record"]["state"] == "done"
     assert steps["align"]["state"] == "done"
+
+
+def test_second_pass_begins_anew_on_every_page(served, inspection):
+    behave(inspection, interval_s=0.01, passes=2)
+    visitor = served.visitor()
+    with visitor.live() as wire:
+        visitor.run("plate-1", "record")
+        seen = news_until(wire, job_state("done"))
+        with visitor.live() as late:
+            shown = seen_readings(news_until(late, lambda news: news["total"] == 100))
+    numbers = [news["scan"] for news in seen if "answer" not in news and news["readings"]]
+    assert sorted(set(numbers)) == [1, 2]
+    second = [news for news in seen if "answer" not in news and news["scan"] == 2]
+    assert all(news["anew"] for news in second)
+    assert len(seen_readings(second)) == len(shown) == 100
+    steps = {step["name"]: step for step in visitor.ask("overview", name="plate-1")[1]["steps"]}
+    assert steps["record"]["figure"] == "100 of 100 readings"

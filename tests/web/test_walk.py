@@ -16,11 +16,13 @@ NAME = "walk"
 
 
 def quick_cell(inspection: Inspection) -> None:
-    """Make the virtual cell quick: fast clock, two views, coarse facets."""
+    """Make the virtual cell quick: fast clock, three views, coarse facets, one pass."""
     text = inspection.rig_file.read_text()
     for key, value in {"time_factor": "40.0", "mesh_edge_mm": "2.0", "views": "3"}.items():
         text = re.sub(rf"^{key} = \S+", f"{key} = {value}", text, count=1, flags=re.M)
     inspection.rig_file.write_text(text)
+    technique = inspection.technique_file.read_text()
+    inspection.technique_file.write_text(re.sub(r"^passes = \S+", "passes = 1", technique, flags=re.M))
 
 
 def handle(hand: Hand, axis: int, side: int) -> tuple[float, float]:
@@ -54,8 +56,6 @@ def test_operator_walks_from_new_inspection_to_report(tmp_path, serve):
 def begin(hand: Hand, inspection: Inspection) -> None:
     assert "No inspection yet" in hand.text("#main")
     hand.picture("empty")
-    hand.type("#new-name", NAME)
-    hand.click("#new-part option[value='plate'], #new-part option:last-child")
     hand.type("#new-name", NAME)
     hand.click("#new")
     hand.find("#do-views")
@@ -100,10 +100,10 @@ def technique_and_plan(hand: Hand, inspection: Inspection) -> None:
     hand.type("[id='plan.pitch_mm']", "-4")
     hand.wait(lambda: "greater than 0" in hand.text(".form"), what="the limit is told as typed")
     assert not hand.find("#save-technique").is_enabled()
-    hand.type("[id='plan.pitch_mm']", "14")
-    hand.type("[id='plan.step_mm']", "9")
+    hand.type("[id='plan.pitch_mm']", "12")
+    hand.type("[id='plan.step_mm']", "6")
     hand.click("#save-technique")
-    hand.wait(lambda: inspection.technique().plan.pitch_mm == 14)
+    hand.wait(lambda: inspection.technique().plan.pitch_mm == 12)
     hand.wait(lambda: not hand.js("return eddyscan.running"))
     hand.click("#do-plan")
     hand.job_is("plan", "done", seconds=40)

@@ -84,6 +84,8 @@ class Bench:
         self.job: Job | None = None
         self._next: list[str] = []
         self.readings: list[list[float | None]] = []
+        self.scan_number = 0
+        self.scan_begins_anew = False
         self.log: deque[dict[str, Any]] = deque(maxlen=LOG_KEPT)
         self._logged = 0
         self.revision = 0
@@ -171,7 +173,7 @@ class Bench:
 
     def _new_job(self, folder: Path, step: str) -> Job:
         if step == "record":
-            self.readings = []
+            self._new_readings(anew=False)
         self.stop_seconds, self._stop_asked = None, None
         return Job(1 if self.job is None else self.job.number + 1, str(folder), step)
 
@@ -195,6 +197,15 @@ class Bench:
 
     def _on_readings(self, message: dict[str, Any], job: Job) -> None:
         self.readings.extend(message["rows"])
+
+    def _on_pass(self, message: dict[str, Any], job: Job) -> None:
+        self._new_readings(anew=True)
+        self.tell("Scan: the next pass over the part begins.")
+
+    def _new_readings(self, *, anew: bool) -> None:
+        self.readings = []
+        self.scan_number += 1
+        self.scan_begins_anew = anew
 
     def _on_note(self, message: dict[str, Any], job: Job) -> None:
         self.tell(message["message"], "warning")

@@ -12,6 +12,7 @@ from eddyscan.inspection import Inspection, StepState, read_json
 from eddyscan.web.decisions import decisions
 
 TITLES = {"views": "Views", "surface": "Surface", "plan": "Plan", "align": "Align", "record": "Scan"}
+LAST_PASS = "SELECT COUNT(*) FROM readings WHERE pass = (SELECT MAX(pass) FROM readings)"
 TITLES |= {"cscan": "Results", "report": "Report"}
 
 
@@ -64,12 +65,12 @@ def is_virtual(inspection: Inspection) -> bool:
 
 
 def readings_so_far(path: Path) -> int:
-    """Return how many readings a record holds, without holding up its writer."""
+    """Return how many readings the last pass of a record holds, without holding up its writer."""
     if not path.is_file():
         return 0
     try:
         with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=1.0)) as db:
-            return int(db.execute("SELECT COUNT(*) FROM readings").fetchone()[0])
+            return int(db.execute(LAST_PASS).fetchone()[0])
     except sqlite3.Error:
         return 0
 

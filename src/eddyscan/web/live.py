@@ -35,7 +35,7 @@ class Live(tornado.websocket.WebSocketHandler):
         self.door = door
         self._awake = asyncio.Event()
         self._sending: asyncio.Task[None] | None = None
-        self._job = -1
+        self._scan = 0
         self._readings = 0
         self._logged = 0
 
@@ -113,8 +113,8 @@ class Live(tornado.websocket.WebSocketHandler):
     def _news(self) -> dict[str, Any]:
         bench = self.door.bench
         job = bench.job
-        if job is not None and job.step == "record" and job.number != self._job:
-            self._job, self._readings = job.number, 0
+        if bench.scan_number != self._scan:
+            self._scan, self._readings = bench.scan_number, 0
         readings = bench.readings[self._readings : self._readings + READINGS_AT_ONCE]
         first = self._readings
         self._readings += len(readings)
@@ -128,7 +128,8 @@ class Live(tornado.websocket.WebSocketHandler):
             "revision": bench.revision,
             "pages": len(self.door.pages),
             "log": new,
-            "scan": self._job,
+            "scan": self._scan,
+            "anew": bench.scan_begins_anew,
             "first": first,
             "total": len(bench.readings),
             "readings": readings,

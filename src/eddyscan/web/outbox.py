@@ -12,6 +12,7 @@ from eddyscan.web.link import Link
 from eddyscan.web.placing import Placing
 
 EVERY_S = 0.05
+SCAN = "scan"
 
 
 class Outbox:
@@ -26,13 +27,15 @@ class Outbox:
         self._due = threading.Event()
         self._events: list[dict[str, Any]] = []
         self._progress: dict[str, tuple[float, float]] = {}
-        self._readings: list[Reading] = []
+        self._sets: list[list[Reading]] = [[]]
+        self._done: dict[str, float] = {}
         self._placing: Placing | None = None
         threading.Thread(target=self._send_for_ever, daemon=True, name="send").start()
 
     def begin(self, folder: Path, step: str) -> None:
         """Start a job's messages."""
         self._placing = Placing(folder)
+        self._done = {}
         self.event("begun", step=step, folder=str(folder))
 
     def end(self, ending: dict[str, Any]) -> None:
@@ -48,12 +51,15 @@ class Outbox:
     def progress(self, what: str, done: float, total: float) -> None:
         """Take a Progress call."""
         with self._lock:
+            if done < self._done.get(what, 0.0) and what == SCAN:
+                self._sets.append([])  # the count began anew: another pass over the part
+            self._done[what] = float(done)
             self._progress[what] = (float(done), float(total))
 
     def readings(self, readings: Sequence[Reading]) -> None:
         """Take readings that are on the disk."""
         with self._lock:
-            self._readings.extend(readings)
+            self._sets[-1].extend(readings)
 
     def _send_for_ever(self) -> None:
         try:
@@ -68,11 +74,14 @@ class Outbox:
         with self._lock:
             events, self._events = self._events, []
             progress, self._progress = self._progress, {}
-            readings, self._readings = self._readings, []
+            sets, self._sets = self._sets, [[]]
         for what, (done, total) in progress.items():
             self._link.send({"event": "progress", "what": what, "done": done, "total": total})
-        if readings:
-            self._send_readings(readings)
+        for number, readings in enumerate(sets):
+            if number:
+                self._link.send({"event": "pass"})
+            if readings:
+                self._send_readings(readings)
         for event in events:
             self._link.send(event)
 

@@ -134,8 +134,10 @@ class App {
   }
 
   follow(news) {
-    if (this.scan !== news.scan) this.scan = news.scan;
-    if (news.readings.length && this.job && this.job.folder.split("/").pop() === this.name) this.readings.add(news.readings);
+    const mine = this.job && this.job.folder.split("/").pop() === this.name;
+    if (this.scan !== news.scan && news.anew && mine && this.scan !== -1) this.readings = new Readings();
+    this.scan = news.scan;
+    if (news.readings.length && mine) this.readings.add(news.readings);
   }
 
   // ---- what the frame shows ----
