@@ -19,6 +19,7 @@ from eddyscan.planning.trace import Rays
 
 CORNER_DEG = 35.0
 CORNER_REACH_MM = 2.5
+CLUSTER_REACHES = 3
 ROUND_ENOUGH = 1.6
 RAY_SPACING = 0.75
 POLE_RAYS = 360
@@ -43,7 +44,9 @@ def middle_seed(mesh: Filled, edges: Edges, f: Array) -> Seed | None:
     if not lines:
         return None
     corner = f[mesh.faces]
-    crossed = (corner.min(axis=1) <= 0) & (corner.max(axis=1) > 0)
+    # Where the line meets vertices, faces on both sides count, whichever way rounding falls.
+    near = 1e-6 * mesh.edge_mm
+    crossed = (corner.min(axis=1) <= near) & (corner.max(axis=1) >= -near)
     vertex = np.unique(mesh.faces[crossed])
     side = np.where(f > 0, 1.0, -1.0)
     polylines = [evened(line.points, mesh.edge_mm, closed=line.closed) for line in lines]
@@ -164,11 +167,19 @@ def _between_sides(mesh: Filled) -> Iterator[Array]:
 def _peaks(turn_deg: Array, points: Array) -> IntArray:
     """Return the sharpest vertex (K,) of each corner in running order."""
     left = np.where(turn_deg > CORNER_DEG, turn_deg, 0.0)
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    # Over a few mm a corner is seen from its neighbours too; the turn at the vertex itself tells which it is.
+    own = -np.einsum("nk,nk->n", before, after) / np.maximum(
+        np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-12
+    )
     found = []
     while left.max() > 0:
-        best = int(np.argmax(left))
+        near = np.linalg.norm(points - points[int(np.argmax(left))], axis=1) < CLUSTER_REACHES * CORNER_REACH_MM
+        candidates = np.flatnonzero(near & (left > 0))
+        best = int(candidates[np.argmax(np.round(own[candidates], 6))])
         found.append(best)
-        left[np.linalg.norm(points - points[best], axis=1) < 3 * CORNER_REACH_MM] = 0.0
+        near |= np.linalg.norm(points - points[best], axis=1) < CLUSTER_REACHES * CORNER_REACH_MM
+        left[near] = 0.0
     return np.sort(np.asarray(found, dtype=np.int64))
 
 

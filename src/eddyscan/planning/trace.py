@@ -15,7 +15,8 @@ from scipy.spatial import KDTree
 from eddyscan.core.frames import Array, BoolArray, IntArray
 from eddyscan.planning.smooth import SmoothSurface
 
-AGREEMENT_MM = 0.5
+# The rough field errs with the mesh: rays may differ by this and a share of an edge.
+AGREEMENT_MM, AGREEMENT_OF_EDGE = 0.3, 0.4
 FADE_MM = 5.0
 NEIGHBOURS = 3
 
@@ -45,7 +46,7 @@ def exact_distance(surface: SmoothSurface, field: Array, rays: list[Rays], step_
         ahead = np.einsum("vkj,vkj->vk", surface.vertices[:, None] - points[index], ways[index])
         weight = valid / (np.where(valid, near, 1.0) ** 2 + 1e-6)
         # Rays beyond a ridge came the longer way round: the field tells them off.
-        weight *= np.abs(s[index] + ahead - side[:, None]) < AGREEMENT_MM
+        weight *= np.abs(s[index] + ahead - side[:, None]) < AGREEMENT_MM + AGREEMENT_OF_EDGE * step_mm
         total = weight.sum(axis=1)
         better = total > 0
         exact = (weight * (s[index] + ahead)).sum(axis=1) / np.where(better, total, 1.0)
