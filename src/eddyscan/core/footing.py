@@ -55,6 +55,10 @@ class SmoothSurface:
         self._fits = _quadrics(mesh, self._vertices, self._centres, radius_mm)
         self._near_centre = KDTree(mesh.vertices[self._centres])
 
+    def nearest_mm(self, points_mm: Array) -> float:
+        """Return the distance [mm] of the nearest of points (M, 3) to the nearest vertex."""
+        return float(np.min(self._vertices.query(points_mm)[0]))
+
     def below(self, points_mm: Array, *, axis: Array | None = None) -> Footing:
         """Return the surface below points (M, 3); arguments and errors of `footing`."""
         _require_near(self._vertices, points_mm)

@@ -43,6 +43,7 @@ BEYOND_RIM_MM = 1.6
 CANDIDATES = 400
 LARGEST_TILT_DEG = 22.0
 FARTHEST_MM = 6.0
+NO_METAL_MM = 30.0  # the coil feels nothing of metal this far away
 WEAK_MM = 0.5
 WEAK_DEG = 0.5
 
@@ -339,8 +340,10 @@ def _cross(probe: FieldProbe, solver: PoseSolver, pose: Pose, rim_point: int) ->
 def _without_metal(solver: PoseSolver, pose: Pose, air_ohm: complex, high_mm: Array) -> tuple[SoundResponse, complex]:
     """Return curve and air reading after taking out what the metal far below still did to the air reading."""
     at = apply(invert(pose.T_stage_part), high_mm[None])
-    distance = float(solver.surface.below(at).distance_mm[0])
     old = solver.response
+    if solver.surface.nearest_mm(at) > NO_METAL_MM:
+        return old, air_ohm
+    distance = float(solver.surface.below(at).distance_mm[0])
     change = complex(impedance_change_ohm(old.coil, old.conductor, old.frequency_hz, np.array([max(distance, 1.0)]))[0])
     air = air_ohm - change * old.gain
     return (
