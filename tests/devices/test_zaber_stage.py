@@ -6,12 +6,17 @@ import pytest
 from eddyscan.core.errors import DeviceError, LinkError, MotionError
 from eddyscan.devices.clock import ScaledClock, VirtualClock
 from eddyscan.devices.drivers.zaber import ZaberStage
-from eddyscan.devices.drivers.zaber_settings import STUDY_CHAIN, ZaberStageSettings
+from eddyscan.devices.drivers.zaber_settings import STUDY_CHAIN, ZaberAxis, ZaberStageSettings
 from eddyscan.devices.sim.zaber import Fault
-from eddyscan.devices.sim.zaber_settings import ZaberSettings
+from eddyscan.devices.sim.zaber_settings import STUDY_AXES, SimulatedAxis, ZaberSettings
 from tests.devices.path_contract import PathContract, wave_path
 from tests.devices.stage_contract import StageContract
 from tests.devices.zaber_cell import zaber_cell
+
+ROTARY = SimulatedAxis(
+    name="b", model="rotary", unit="deg", serial_number=104, travel=90.0, microstep=0.0009375, lower=-45.0, start=0.0
+)
+TILT = ZaberAxis(name="b", model="rotary", device=4, unit="deg", travel=90.0, microstep=0.0009375, lower=-45.0)
 
 
 @pytest.fixture
@@ -20,14 +25,15 @@ def clock():
 
 
 class TestZaberStage(StageContract):
-    @pytest.fixture(params=["chain-7", "chain-6", "controller"])
+    @pytest.fixture(params=["chain-7", "chain-6", "controller", "with a rotary axis"])
     def stage(self, request, clock):
-        settings = {
-            "chain-7": ZaberSettings(),
-            "chain-6": ZaberSettings(firmware="6.28"),
-            "controller": ZaberSettings(layout="mcc"),
+        settings, driver = {
+            "chain-7": (ZaberSettings(), {}),
+            "chain-6": (ZaberSettings(firmware="6.28"), {}),
+            "controller": (ZaberSettings(layout="mcc"), {}),
+            "with a rotary axis": (ZaberSettings(axes=(*STUDY_AXES, ROTARY)), {"axes": (*STUDY_CHAIN, TILT)}),
         }[request.param]
-        with zaber_cell(clock, settings, home=False) as cell:
+        with zaber_cell(clock, settings, home=False, **driver) as cell:
             yield cell.stage
 
 

@@ -81,6 +81,24 @@ def test_no_reading_of_a_good_scan_is_doubted(cell, mode):
     assert all(r.flag == 0 for r in cell.sink.readings)
 
 
+def test_a_reading_is_durable_within_50_ms_or_before_the_next_move(cell, mode):
+    stamps, waited = {}, []
+    read = cell.instrument.read
+
+    def stamped():
+        heard = read()
+        stamps[heard.impedance_ohm] = heard.time_s
+        return heard
+
+    cell.instrument.read = stamped
+    cell.sink.on_write = lambda readings: waited.extend(
+        cell.clock.now() - stamps[reading.impedance_ohm] for reading in readings
+    )
+    go(cell, wavy_plan(rows=2, points=21), mode)
+    assert len(waited) == 42
+    assert max(waited) <= 0.05
+
+
 def test_settings_as_applied_are_noted(cell, mode):
     go(cell, wavy_plan(rows=1), mode)
     assert np.allclose(cell.sink.noted("T_stage_part")[0], T_STAGE_PART)
