@@ -45,7 +45,7 @@ faults: .venv/.dev
 
 docs: .venv/.dev
 	$(BIN)/python tools/reference_pages.py docs/reference
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # Pins: names, versions and hashes, no index address. Needs uv on the PATH.
 lock:

@@ -61,7 +61,7 @@ def commands_page() -> str:
         for parameter in command.params:
             words = getattr(parameter, "help", None) or ""
             label = (
-                ", ".join(parameter.opts) if parameter.param_type_name == "option" else parameter.human_readable_name
+                ", ".join(parameter.opts) if parameter.param_type_name == "option" else (parameter.name or "").upper()
             )
             rows.append(f"| `{label}` | {words.replace('|', chr(92) + '|')} |")
         lines += ["| option | meaning |", "|---|---|", *rows, ""]
