@@ -15,6 +15,7 @@ from eddyscan.core.frames import apply
 from eddyscan.core.technique import Drive
 from eddyscan.devices.clock import VirtualClock
 from eddyscan.devices.drivers.keysight_e4980a import KeysightE4980A, KeysightE4980ASettings
+from eddyscan.devices.rig import open_rig, virtual_rig
 from eddyscan.devices.sim.camera import VirtualDepthCamera
 from eddyscan.devices.sim.camera_raycast import Raycaster
 from eddyscan.devices.sim.instrument_physics import CoilResponse
@@ -106,6 +107,36 @@ def speed_table() -> list[str]:
     ]
 
 
+def scan_table() -> list[str]:
+    """Return what a stepped point costs with the real libraries at the cell's usual pace."""
+    with open_rig(virtual_rig("block-a", SEED)) as rig:
+        rig.stage.home()
+        rig.instrument.configure(Drive(frequency_hz=FREQUENCY_HZ))
+        T_stage_part, _ = rig.alignment()
+        x = np.arange(5.0, 195.0, 5.0)
+        part = facts_of(WorldSettings(part="block-a", seed=SEED)).part
+        spots = part.surface(x, np.full(len(x), 50.0)) + 1.0 * part.normal(x, np.full(len(x), 50.0))
+        places = apply(T_stage_part, spots)
+        rig.stage.move(np.array([*places[0, :2], 38.0]))
+        rig.stage.move(places[0])
+        rig.instrument.read()
+        path = [*places, *places[::-1]] * 2
+        cpu, wall, cell = time.process_time(), time.perf_counter(), rig.clock.now()
+        for place in path:
+            rig.stage.move(place, 25.0)
+            rig.clock.sleep(0.05)
+            rig.instrument.read()
+        count = len(path)
+        cpu, wall = (time.process_time() - cpu) / count, (time.perf_counter() - wall) / count
+        cell = (rig.clock.now() - cell) / count
+    return [
+        "| one point of 5 mm | CPU ms | wall ms | cell's time s | 800 points, wall s |",
+        "|---|---|---|---|---|",
+        f"| move at 25 mm/s, settle 0.05 s, read | {1e3 * cpu:.1f} | {1e3 * wall:.1f} | {cell:.2f} "
+        f"| {800 * wall:.0f} |",
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="put the tables into docs/validation.md")
@@ -125,6 +156,10 @@ def main() -> None:
             "Cost of a reading on block-c, one thread.",
             "",
             *speed_table(),
+            "",
+            "Cost of a stepped point: zaber-motion and PyMeasure against the simulators, all in one process.",
+            "",
+            *scan_table(),
         ]
     )
     print(body)
