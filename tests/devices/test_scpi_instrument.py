@@ -1,6 +1,7 @@
 """The generic instrument: a meter described by lines of TOML, against the simulated E4980A."""
 
 import tomllib
+from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
@@ -10,7 +11,7 @@ from eddyscan.core.record import OVERLOAD
 from eddyscan.core.technique import Drive
 from eddyscan.devices.clock import VirtualClock
 from eddyscan.devices.drivers.scpi import ScpiInstrument, ScpiSettings
-from eddyscan.devices.rig import connect
+from eddyscan.devices.rig import RigSettings, connect
 from eddyscan.devices.sim.lcr import LcrSimulator
 from tests.devices.fixed_coil import FixedCoil
 from tests.devices.instrument_contract import DRIVE, InstrumentContract
@@ -123,3 +124,14 @@ def test_free_running_reading_is_stamped_by_its_age(meter):
 def test_line_that_cannot_be_filled_is_refused_when_the_rig_is_read():
     with pytest.raises(ValidationError, match="cannot be filled with frequency_hz and level_v"):
         ScpiSettings(frequency="FREQ {hertz}")
+
+
+def test_the_how_to_page_describes_a_meter_that_works(meter):
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "add-an-instrument.md").read_text(encoding="utf-8")
+    table = next(block for block in page.split("```toml") if "[instrument.options]" in block).split("```")[0]
+    rig = RigSettings.model_validate(tomllib.loads(table))
+    device = connect("instrument", rig.instrument.driver, meter.address, rig.instrument.options, clock=VirtualClock())
+    device.configure(DRIVE)
+    true = FixedCoil().true_ohm(DRIVE.frequency_hz)
+    assert abs(device.read().impedance_ohm - true) < 1e-3 * abs(true)
+    device.close()
