@@ -28,13 +28,13 @@ from eddyscan.core.frames import Array
 from eddyscan.core.indication import Indication
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.parts import named_part
-from eddyscan.report.blocks import Chart
+from eddyscan.report.blocks import Chart, Facts, Table
 from eddyscan.report.content import NominalComparison
 from eddyscan.report.envelopes import MOST_POINTS, envelope, sparse
 from eddyscan.report.figures_coverage import examined_share, share_texts, vertex_areas
 from eddyscan.report.figures_indication import lift_off_rotation, neighbourhood
 from eddyscan.report.figures_position import axis_errors, longest_row
-from eddyscan.report.figures_signal import median_ohm, reading_maps
+from eddyscan.report.figures_signal import cscan_figure, median_ohm, reading_maps
 from eddyscan.report.figures_surface import heights, profile
 from eddyscan.report.figures_views import view_picture
 from eddyscan.report.headline import headline
@@ -42,7 +42,8 @@ from eddyscan.report.mesh_thinning import on_border, thinned
 from eddyscan.report.scene import scene_json
 from eddyscan.report.sections import sections
 from eddyscan.report.sections_result import false_call_basis, indication_table, reference_amplitude
-from eddyscan.report.theme import VARIABLES, to_svg
+from eddyscan.report.tables import blocks_of
+from eddyscan.report.theme import PAPER, VARIABLES, drawn, to_svg
 from eddyscan.report.words import flattened, label, number, percent, plus_minus
 
 
@@ -336,3 +337,27 @@ def test_no_picture_inside_a_drawing_holds_a_stand_in_colour() -> None:
             assert not stand_ins & set(map(tuple, np.unique(solid, axis=0).tolist())), chart.caption
             pictures += 1
     assert pictures >= 6
+
+
+def test_a_dome_is_profiled_along_its_middle_and_a_block_over_all_of_y() -> None:
+    dome = profile(named_part("dome").top_mesh(1.0), None)
+    assert "the middle, y 44.0 to 56.0 mm" in dome.how
+    inside = np.abs(dome.x_mm - 50) < 40
+    expected = np.sqrt(50.0**2 - (dome.x_mm[inside] - 50) ** 2)
+    np.testing.assert_allclose(dome.measured_mm[inside], expected, atol=0.5)
+    assert profile(named_part("block-a").top_mesh(2.0), None).how == "averaged over y"
+
+
+def test_lists_of_findings_become_tables() -> None:
+    facts, table = blocks_of({"flaws": {"found": 1, "each": [{"depth_mm": 1.0}, {"depth_mm": 0.5}]}})
+    assert isinstance(facts, Facts)
+    assert facts.rows == (("flaws · found", "1"),)
+    assert isinstance(table, Table)
+    assert (table.title, table.columns, table.rows) == ("Flaws · each", ("depth [mm]",), (("1",), ("0.5",)))
+
+
+def test_a_channel_nobody_speaks_for_is_said_not_drawn() -> None:
+    plate = named_part("plate").top_mesh(20.0)
+    cscan = CScan(plate, np.zeros(len(plate.vertices), bool), {"score": np.zeros(len(plate.vertices))})
+    figure = drawn(lambda theme: cscan_figure(cscan, ["score"], theme), PAPER)
+    assert "no reading speaks here" in [text.get_text() for text in figure.axes[0].texts]

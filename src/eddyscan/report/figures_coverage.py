@@ -39,7 +39,7 @@ def coverage_figure(cscan: CScan, theme: Theme) -> Figure:  # noqa: ARG001 - eve
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    figure, axes = canvas(height_in=map_height_in(cscan.mesh.vertices, 4.4, extra_in=1.0), width_in=4.4)
+    figure, axes = canvas(height_in=map_height_in(cscan.mesh.vertices, 4.4, extra_in=1.35), width_in=4.4)
     mesh = cscan.mesh
     examined = cscan.covered[mesh.faces].all(axis=1)
     axes.tripcolor(

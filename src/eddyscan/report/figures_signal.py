@@ -15,6 +15,7 @@ from eddyscan.report.theme import Theme, canvas, colour_bar, map_axes, map_heigh
 from eddyscan.report.words import label
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -67,6 +68,12 @@ def readings_figure(record: ScanRecord, maps: dict[str, Array], theme: Theme) ->
     return figure
 
 
+def _say(panel: Axes, text: str) -> None:
+    """Write in the middle of an empty panel instead of showing bare axes."""
+    panel.set_axis_off()
+    panel.text(0.5, 0.5, text, ha="center", va="center", transform=panel.transAxes)
+
+
 def _colours(title: str) -> str:
     return "cividis" if "lift" in title else "viridis"
 
@@ -94,6 +101,10 @@ def cscan_figure(cscan: CScan, names: list[str], theme: Theme) -> Figure:
     for panel, name in zip(panels.flat, names, strict=False):
         values = cscan.channels[name]
         known = np.isfinite(values) & cscan.covered
+        map_axes(panel, label(name))
+        if not known.any():
+            _say(panel, "no reading speaks here")
+            continue
         faces = mesh.faces[known[mesh.faces].all(axis=1)]
         if len(faces):
             drawn = panel.tripcolor(
@@ -107,7 +118,6 @@ def cscan_figure(cscan: CScan, names: list[str], theme: Theme) -> Figure:
                 rasterized=True,
             )
             colour_bar(figure, drawn, panel, "", theme)
-        map_axes(panel, label(name))
     for panel in panels.flat[len(names) :]:
         panel.set_axis_off()
     return figure

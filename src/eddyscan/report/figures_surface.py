@@ -16,33 +16,44 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BINS = 100
+SAME_HEIGHT_MM, MIDDLE_SHARE = 0.5, 0.06
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Heights along x, averaged over y in strips that hold a vertex: (K,) arrays in mm.
+    """Heights along x in strips that hold a vertex: (K,) arrays in mm.
 
     The spread is the standard deviation across y of what the nominal (or, without
-    one, the mean line) leaves over, so a slope does not count as spread.
+    one, the mean line) leaves over, so a slope does not count as spread. `how`
+    says in words what was averaged.
     """
 
     x_mm: Array
     measured_mm: Array
     spread_mm: Array
     nominal_mm: Array
+    how: str
 
 
 def profile(mesh: SurfaceMesh, nominal: NominalComparison | None) -> Profile:
-    """Average z in strips along x, measured and nominal at the very same spots."""
+    """Average z in strips along x, measured and nominal at the very same spots.
+
+    A part that keeps its height across y (a block) is averaged over all of y, as in
+    the study; one that does not (a dome, a blade) over a band about its middle.
+    """
     points = mesh.vertices if nominal is None else apply(nominal.T_nominal_mesh, mesh.vertices)
-    expected = np.full(len(points), np.nan) if nominal is None else heights(nominal.surface, points[:, :2])
-    if nominal is not None:
-        points, expected = points[np.isfinite(expected)], expected[np.isfinite(expected)]
+    points, expected = _with_nominal_height(points, nominal)
+    how = "averaged over y"
+    if len(points) and _height_across_y_mm(points) > SAME_HEIGHT_MM:
+        low, high = points[:, 1].min(), points[:, 1].max()
+        middle, half = (low + high) / 2, MIDDLE_SHARE * (high - low)
+        near = np.abs(points[:, 1] - middle) <= half
+        points, expected = points[near], expected[near]
+        how = f"averaged over the middle, y {middle - half:.1f} to {middle + half:.1f} mm"
     if len(points) == 0:
-        return Profile(*(np.array([np.nan]) for _ in range(4)))
-    edges = np.linspace(points[:, 0].min(), points[:, 0].max() + 1e-9, BINS + 1)
-    strip = np.digitize(points[:, 0], edges) - 1
-    _, strip = np.unique(strip, return_inverse=True)
+        nothing = np.array([np.nan])
+        return Profile(nothing, nothing, nothing, nothing, how)
+    strip = _strips(points)
     x_mm, z_mm, nominal_mm = (_mean(values, strip) for values in (points[:, 0], points[:, 2], expected))
     along = expected
     if nominal is None:
@@ -50,7 +61,32 @@ def profile(mesh: SurfaceMesh, nominal: NominalComparison | None) -> Profile:
         along = z_mm[strip] + slope[strip] * (points[:, 0] - x_mm[strip])
     off = points[:, 2] - along
     spread = np.sqrt(_mean((off - _mean(off, strip)[strip]) ** 2, strip))
-    return Profile(x_mm, z_mm, spread, nominal_mm)
+    return Profile(x_mm, z_mm, spread, nominal_mm, how)
+
+
+def _with_nominal_height(points: Array, nominal: NominalComparison | None) -> tuple[Array, Array]:
+    """Return the points that have a nominal height, and it; without a nominal all of them, and NaN."""
+    if nominal is None:
+        return points, np.full(len(points), np.nan)
+    expected = heights(nominal.surface, points[:, :2])
+    known = np.isfinite(expected)
+    return points[known], expected[known]
+
+
+def _strips(points: Array) -> IntArray:
+    """Return the number of the strip along x of each point, without gaps from 0."""
+    edges = np.linspace(points[:, 0].min(), points[:, 0].max() + 1e-9, BINS + 1)
+    _, strip = np.unique(np.digitize(points[:, 0], edges), return_inverse=True)
+    return np.asarray(strip, dtype=np.int64)
+
+
+def _height_across_y_mm(points: Array) -> float:
+    """Return how much z varies across y, slope along x taken out: median over the strips [mm]."""
+    strip = _strips(points)
+    mean_x, mean_z = _mean(points[:, 0], strip), _mean(points[:, 2], strip)
+    slope = np.gradient(mean_z, mean_x) if len(mean_x) > 1 else np.zeros(1)
+    off = points[:, 2] - mean_z[strip] - slope[strip] * (points[:, 0] - mean_x[strip])
+    return float(np.median(np.sqrt(_mean(off**2, strip))))
 
 
 def _mean(values: Array, group: IntArray) -> Array:
@@ -85,9 +121,9 @@ def profile_figure(mesh: SurfaceMesh, nominal: NominalComparison | None, theme: 
     )
     if nominal is not None:
         top.plot(line.x_mm, line.nominal_mm, color=theme.accent, lw=2.2, label=f"nominal {nominal.name}")
-    top.plot(line.x_mm, line.measured_mm, color=theme.second, lw=1.1, label="measured, mean over y (band: ± 1 std)")
+    top.plot(line.x_mm, line.measured_mm, color=theme.second, lw=1.1, label="measured (band: ± 1 std)")
     top.set_ylabel("z [mm]")
-    top.set_title("Height along x")
+    top.set_title(f"Height along x, {line.how}")
     top.legend(loc="best")
     if nominal is not None:
         below = axes[1, 0]
@@ -135,6 +171,7 @@ def uncertainty_figure(mesh: SurfaceMesh, theme: Theme) -> Figure:
         mesh.vertices[:, 1],
         mesh.faces,
         1000 * mesh.uncertainty_mm,
+        vmax=1000 * float(np.nanpercentile(mesh.uncertainty_mm, 99)),
         cmap="cividis",
         shading="gouraud",
         rasterized=True,

@@ -79,13 +79,13 @@ def nominal(content: ReportContent) -> Section | None:
     if content.mesh is None:
         return None
     if content.nominal is None:
-        chart = Chart(partial(profile_figure, content.mesh, None), "Height along x, averaged over y.")
+        chart = Chart(partial(profile_figure, content.mesh, None), "Height along x.")
         text = "No nominal surface was given, so nothing is said about deviations from it."
         return Section("nominal", "Against the nominal", "", (Note(text, "missing"), chart))
     blocks: list[Block] = [
         Chart(
             partial(profile_figure, content.mesh, content.nominal),
-            f"Height along x averaged over y, against nominal {content.nominal.name} at the same spots.",
+            f"Height along x against nominal {content.nominal.name} at the same spots.",
         )
     ]
     signed = content.nominal.signed_mm

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from eddyscan.report.blocks import Block, Facts, Note, Section, Signatures, Table
 from eddyscan.report.content import ReportContent
-from eddyscan.report.tables import facts_of
+from eddyscan.report.tables import blocks_of
 from eddyscan.report.words import number
 
 
@@ -13,9 +13,7 @@ def truth(content: ReportContent) -> Section | None:
     if content.truth is None:
         return None
     warning = "Known only because this was a simulation. No step of the inspection saw these values."
-    return Section(
-        "truth", "Against the hidden truth", "", (Note(warning, "warning"), facts_of(content.truth, wide=True))
-    )
+    return Section("truth", "Against the hidden truth", "", (Note(warning, "warning"), *blocks_of(content.truth)))
 
 
 def provenance(content: ReportContent) -> Section:

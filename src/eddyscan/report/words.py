@@ -71,6 +71,7 @@ WORDS = {
     "max": "largest",
     "min": "least",
     "std": "standard deviation",
+    "sd": "standard deviation",
 }
 
 
