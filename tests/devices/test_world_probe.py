@@ -232,6 +232,11 @@ class TestFlaws:
         with pytest.raises(TechniqueError, match=r"x = 250, y = 30 mm lies off the surface of block-a"):
             placed(named_part("block-a"), WorldFlaw(x_mm=250, y_mm=30, length_mm=1, depth_mm=1))
 
+    def test_a_slot_wider_than_deep_is_refused_before_anything_starts(self):
+        slot = WorldFlaw(x_mm=80, y_mm=40, length_mm=1.0, depth_mm=0.1, opening_mm=0.4)
+        with pytest.raises(TechniqueError, match=r"opening_mm = 0.4: must lie from 0 to 0.05 mm"):
+            facts_of(WorldSettings(part="plate", flaws="listed", slots=(slot,)))
+
 
 class TestImperfections:
     def test_coil_sizes_are_off_within_the_tolerance_and_inductance_follows(self):

@@ -11,6 +11,7 @@ from eddyscan.core.frames import Array
 from eddyscan.core.parts import Hemisphere, NominalPart
 from eddyscan.devices.sim.world_foot import FootFinder
 from eddyscan.devices.sim.world_settings import WorldFlaw, WorldSettings
+from eddyscan.physics import Slot
 
 DEFAULT_SIZES_MM = ((3.0, 1.0), (2.0, 0.5), (1.0, 0.3), (0.75, 0.25))
 """Length and depth of the flaws that every default part has."""
@@ -70,8 +71,9 @@ def placed(part: NominalPart, size: WorldFlaw, finder: FootFinder | None = None)
     Raises
     ------
     TechniqueError
-        When (x, y) is not above the inspected surface.
+        When (x, y) is not above the inspected surface, or the sizes are no slot's.
     """
+    Slot(size.length_mm, size.depth_mm, size.opening_mm, size.profile)
     finder = finder or FootFinder(part)
     at = np.array([size.x_mm, size.y_mm, ABOVE_MM])
     for _ in range(30):
