@@ -57,14 +57,14 @@ def write_hdf5(
         file["meta"].attrs["description"] = "settings, devices, hashes and events as JSON"
         readings = file.create_group("readings")
         for name, (unit, frame, meaning) in READINGS.items():
-            _put(readings, name, getattr(record, name), unit, frame, meaning)
+            _put(readings, name, getattr(record, name), meaning, unit=unit, frame=frame)
         if lift_off_mm is not None:
-            _put(readings, "lift_off_mm", lift_off_mm, "mm", "", "coil to surface along the normal, as analysed")
+            _put(readings, "lift_off_mm", lift_off_mm, "coil to surface along the normal, as analysed", unit="mm")
         if cscan is not None:
             _put_cscan(file, cscan)
 
 
-def _put(group: Any, name: str, values: Any, unit: str, frame: str, meaning: str) -> None:
+def _put(group: Any, name: str, values: Any, meaning: str, *, unit: str = "1", frame: str = "") -> None:
     data = group.create_dataset(name, data=values, compression="gzip" if np.size(values) > 64 else None)
     data.attrs.update({"units": unit, "frame": frame, "description": meaning})
 
@@ -72,16 +72,16 @@ def _put(group: Any, name: str, values: Any, unit: str, frame: str, meaning: str
 def _put_cscan(file: Any, cscan: CScan) -> None:
     surface, mesh = file.create_group("surface"), cscan.mesh
     surface.attrs["frame"] = mesh.frame
-    _put(surface, "vertices", mesh.vertices, "mm", mesh.frame, "x, y, z")
-    _put(surface, "faces", mesh.faces, "1", "", "vertex numbers, counter-clockwise from outside")
-    _put(surface, "normals", mesh.normals, "1", mesh.frame, "unit outward normals")
+    _put(surface, "vertices", mesh.vertices, "x, y, z", unit="mm", frame=mesh.frame)
+    _put(surface, "faces", mesh.faces, "vertex numbers, counter-clockwise from outside")
+    _put(surface, "normals", mesh.normals, "unit outward normals", frame=mesh.frame)
     if mesh.uncertainty_mm is not None:
-        _put(surface, "uncertainty_mm", mesh.uncertainty_mm, "mm", "", "standard uncertainty along the normal")
+        _put(surface, "uncertainty_mm", mesh.uncertainty_mm, "standard uncertainty along the normal", unit="mm")
     group = file.create_group("cscan")
-    _put(group, "covered", cscan.covered, "1", "", "true where a reading speaks for the vertex")
+    _put(group, "covered", cscan.covered, "true where a reading speaks for the vertex")
     channels = group.create_group("channels")
     for name, values in cscan.channels.items():
-        _put(channels, name, values, name.rsplit("_", 1)[-1] if "_" in name else "1", "", "per vertex of /surface")
+        _put(channels, name, values, "per vertex of /surface", unit=name.rsplit("_", 1)[-1] if "_" in name else "1")
 
 
 def read_hdf5(path: Path | str) -> Archive:

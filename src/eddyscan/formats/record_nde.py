@@ -48,7 +48,7 @@ def write_nde(
         remark += "; the drive amplitude was not recorded"
     tables = {
         "/Properties": properties(created or datetime.now(UTC), __version__, remark),
-        "/Public/Setup": setup(record, [(f, len(chosen), record.impedance_ohm[chosen]) for f, chosen in groups]),
+        "/Public/Setup": setup(record, [(f, record.impedance_ohm[chosen]) for f, chosen in groups]),
     }
     for name, table in tables.items():
         broken = broken_rules(name, table)

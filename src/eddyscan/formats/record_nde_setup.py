@@ -41,22 +41,22 @@ def properties(created: datetime, software_version: str, remark: str) -> dict[st
     }
 
 
-def setup(record: ScanRecord, groups: list[tuple[float, int, ComplexArray]]) -> dict[str, Any]:
+def setup(record: ScanRecord, groups: list[tuple[float, ComplexArray]]) -> dict[str, Any]:
     """Return the Setup table.
 
     Parameters
     ----------
     record : for devices, probe and rate
-    groups : (frequency [Hz], number of cycles, impedances [ohm]) per drive frequency
+    groups : (frequency [Hz], impedances [ohm]) per drive frequency
     """
-    entries = [_group(k, frequency, count, z, drive_peak_v(record)) for k, (frequency, count, z) in enumerate(groups)]
+    entries = [_group(k, frequency, z, drive_peak_v(record)) for k, (frequency, z) in enumerate(groups)]
     positions = 1e-3 * record.stage_mm
     return {
         "$schema": SETUP_SCHEMA,
         "version": VERSION,
         "scenario": "General Mapping",
         "groups": entries,
-        "dataMappings": [_mapping(k, count, positions) for k, (_, count, _) in enumerate(groups)],
+        "dataMappings": [_mapping(k, len(z), positions) for k, (_, z) in enumerate(groups)],
         "specimens": [{"id": 0, "unspecifiedGeometry": {"surfaces": [{"id": 0}]}}],
         "probes": [_probe(record)],
         "wedges": [{"id": 0, "model": "none", "positioning": _nowhere()}],
@@ -81,8 +81,8 @@ def _span(values: Array, unit: str) -> dict[str, Any]:
     return {"min": low, "max": high, "unitMin": low, "unitMax": high, "unit": unit}
 
 
-def _group(k: int, frequency_hz: float, cycles: int, impedance_ohm: ComplexArray, drive_v: float) -> dict[str, Any]:
-    dimensions = [{"axis": "Channel", "quantity": 1}, {"axis": "AcquisitionCycle", "quantity": cycles}]
+def _group(k: int, frequency_hz: float, impedance_ohm: ComplexArray, drive_v: float) -> dict[str, Any]:
+    dimensions = [{"axis": "Channel", "quantity": 1}, {"axis": "AcquisitionCycle", "quantity": len(impedance_ohm)}]
     parts = np.concatenate([impedance_ohm.real, impedance_ohm.imag])
     outputs = [
         {"id": 0, "datasetId": 0, "dataClass": "Impedance"},

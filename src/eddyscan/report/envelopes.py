@@ -24,7 +24,7 @@ def envelope(x: Array, values: Array, bins: int = 800) -> tuple[Array, Array, Ar
     return x[starts], np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
 
 
-def line(axes: Axes, x: Array, values: Array, colour: str, width: float = 1.0) -> None:
+def line(axes: Axes, x: Array, values: Array, *, colour: str, width: float = 1.0) -> None:
     """Draw a line; one of many points as the band between its least and largest values."""
     if len(values) <= MOST_POINTS:
         axes.plot(x, values, color=colour, lw=width)

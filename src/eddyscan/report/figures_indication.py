@@ -38,9 +38,9 @@ def indication_figure(content: ReportContent, indication: Indication, theme: The
         part[near, 0], part[near, 1], c=np.abs(signal[near]), s=_marker_size(near), marker="s", lw=0, rasterized=True
     )
     picture.plot(*indication.centre_mm[:2], "+", color=theme.alarm, ms=11, mew=1.3)
-    colour_bar(figure, drawn, picture, "|signal| [mΩ]", theme)
+    colour_bar(figure, drawn, picture, theme, title="|signal| [mΩ]")
     map_axes(picture, f"Indication {indication.number}: C-scan")
-    _trace(content, near, middle, plane, theme)
+    _trace(content, plane, theme, near=near, middle=middle)
     _strip(part[middle], signal[middle], strip, theme)
     return figure
 
@@ -67,7 +67,7 @@ def lift_off_rotation(impedance_ohm: ComplexArray, lift_off_mm: Array | None) ->
     return -np.conj(slope) / abs(slope) if abs(slope) > 0 else 1.0
 
 
-def _trace(content: ReportContent, near: BoolArray, middle: BoolArray, axes: Axes, theme: Theme) -> None:
+def _trace(content: ReportContent, axes: Axes, theme: Theme, *, near: BoolArray, middle: BoolArray) -> None:
     """Draw the raw readings of the neighbourhood, row by row, in the turned impedance plane."""
     assert content.record is not None
     record = content.record

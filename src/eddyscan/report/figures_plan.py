@@ -47,7 +47,7 @@ def path_figure(plan: ScanPlan, mesh: SurfaceMesh | None, theme: Theme) -> Figur
     axes.annotate("start", first[:2], (-6, 5), textcoords="offset points", color=theme.ink, fontsize=8.5, ha="right")
     axes.annotate("end", last[:2], (6, 5), textcoords="offset points", color=theme.ink, fontsize=8.5)
     _mark_uncovered(axes, plan, theme)
-    colour_bar(figure, drawn, axes, "visiting order", theme)
+    colour_bar(figure, drawn, axes, theme, title="visiting order")
     map_axes(axes, "The path from above")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3)
     return figure

@@ -61,7 +61,7 @@ def readings_figure(record: ScanRecord, maps: dict[str, Array], theme: Theme) ->
             cmap=_colours(title),
             rasterized=len(values) > 500,
         )
-        colour_bar(figure, drawn, panel, "", theme)
+        colour_bar(figure, drawn, panel, theme)
         map_axes(panel, title)
     for panel in panels.flat[len(maps) :]:
         panel.set_axis_off()
@@ -117,7 +117,7 @@ def cscan_figure(cscan: CScan, names: list[str], theme: Theme) -> Figure:
                 cmap=_colours(name),
                 rasterized=True,
             )
-            colour_bar(figure, drawn, panel, "", theme)
+            colour_bar(figure, drawn, panel, theme)
     for panel in panels.flat[len(names) :]:
         panel.set_axis_off()
     return figure
@@ -132,7 +132,7 @@ def plane_figure(record: ScanRecord, lift_off_mm: Array | None, theme: Theme) ->
     drawn = axes.scatter(
         z.real[known], z.imag[known], c=colour[known], s=5, cmap="cividis", lw=0, rasterized=len(z) > 500
     )
-    colour_bar(figure, drawn, axes, "reading" if lift_off_mm is None else "lift-off [mm]", theme)
+    colour_bar(figure, drawn, axes, theme, title="reading" if lift_off_mm is None else "lift-off [mm]")
     axes.set_xlabel("resistance [Ω]")
     axes.set_ylabel("reactance [Ω]")
     axes.set_title("Impedance plane, as read")
@@ -166,7 +166,7 @@ def strip_figure(record: ScanRecord, residual_ohm: ComplexArray | None, theme: T
         strips["residual [mΩ]"] = 1000 * np.abs(residual_ohm)
     figure, panels = canvas(height_in=0.7 + 1.1 * len(strips), rows=len(strips), sharex=True)
     for panel, (title, values) in zip(panels, strips.items(), strict=True):
-        line(panel, record.time_s, values, theme.second, 0.7)
+        line(panel, record.time_s, values, colour=theme.second, width=0.7)
         panel.set_ylabel(title)
     panels[0].set_title("Strip chart, as read")
     panels[-1].set_xlabel("time since the scan began [s]")

@@ -152,7 +152,7 @@ def deviation_figure(mesh: SurfaceMesh, signed_mm: Array, theme: Theme) -> Figur
             shading="gouraud",
             rasterized=True,
         )
-        colour_bar(figure, drawn, plan, "outside + / inside − [µm]", theme)
+        colour_bar(figure, drawn, plan, theme, title="outside + / inside − [µm]")
     map_axes(plan, "Distance to the nominal along the normal")
     spread.hist(1000 * np.clip(signed_mm[known], -limit, limit), bins=60, color=theme.accent, lw=0)
     spread.axvline(0, color=theme.second, lw=1)
@@ -176,6 +176,6 @@ def uncertainty_figure(mesh: SurfaceMesh, theme: Theme) -> Figure:
         shading="gouraud",
         rasterized=True,
     )
-    colour_bar(figure, drawn, plan, "standard uncertainty [µm]", theme)
+    colour_bar(figure, drawn, plan, theme, title="standard uncertainty [µm]")
     map_axes(plan, "Stated uncertainty along the normal")
     return figure

@@ -156,16 +156,16 @@ def _table(paper: Paper, table: Table) -> None:
     _title(paper, table.title)
     size = SMALL_PT if len(table.columns) < 10 else 6.3
     widths = column_widths(table.columns, table.rows, ROOM_PT, size)
-    _table_row(paper, table, table.columns, widths, size, head=True)
+    _table_row(paper, table, table.columns, widths=widths, size=size, head=True)
     for row in table.rows:
         if paper.need(2.4 * size):
-            _table_row(paper, table, table.columns, widths, size, head=True)
-        _table_row(paper, table, row, widths, size)
+            _table_row(paper, table, table.columns, widths=widths, size=size, head=True)
+        _table_row(paper, table, row, widths=widths, size=size)
     paper.skip(10)
 
 
 def _table_row(
-    paper: Paper, table: Table, cells: tuple[str, ...], widths: list[float], size: float, *, head: bool = False
+    paper: Paper, table: Table, cells: tuple[str, ...], *, widths: list[float], size: float, head: bool = False
 ) -> None:
     lines = [wrapped(cell, width - 6, size) for cell, width in zip(cells, widths, strict=True)]
     height = 1.35 * size * max(len(cell) for cell in lines) + 4

@@ -98,7 +98,7 @@ def drawn(draw: Callable[[Theme], Figure], theme: Theme) -> Figure:
         return draw(theme)
 
 
-def colour_bar(figure: Figure, drawn: Any, axes: Axes, title: str, theme: Theme) -> None:
+def colour_bar(figure: Figure, drawn: Any, axes: Axes, theme: Theme, *, title: str = "") -> None:
     """Put a slim scale beside `axes`."""
     bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=28, pad=0.015)
     bar.outline.set_visible(False)
