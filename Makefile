@@ -5,7 +5,7 @@
 # make faults the long fault campaign of the scan
 PYTHON ?= python3
 BIN := .venv/bin
-export OPENBLAS_NUM_THREADS ?= 2
+export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 2
 
 .PHONY: demo test check bench lock docs clean faults

@@ -16,6 +16,7 @@ RIG_HEADING = """The rig: it changes with a spanner. As written here it is the v
 simulated stage and instrument on the loopback. A real rig needs
 `eddyscan run DIR --rig lab.toml --arm` every time."""
 
+MOVING_FACTOR = 5.0  # beyond this, jitter of the computer is a millimetre of a row read in motion
 PLACING_MM = 2.0  # a part is set on the stage by eye, so not all of the z travel lies where the part needs it
 
 
@@ -73,8 +74,15 @@ class LazyRig:
                 raise InputError(
                     f"{self._file} is a real rig; it moves only with --rig {self._file} --arm given at the terminal."
                 )
-            self._rig = self._stack.enter_context(open_rig(settings))
+            self._rig = self._stack.enter_context(open_rig(self._in_time(settings)))
         return self._rig
+
+    def _in_time(self, settings: RigSettings) -> RigSettings:
+        """Return the settings with a virtual clock slow enough for the technique: moving readings need finer time."""
+        world = settings.world
+        if world is None or self._inspection.technique().scan.mode == "step" or world.time_factor <= MOVING_FACTOR:
+            return settings
+        return settings.model_copy(update={"world": world.model_copy(update={"time_factor": MOVING_FACTOR})})
 
     def travel_mm(self) -> tuple[float, float, float] | None:
         """Return the x, y, z travels the plan has to fit into: rig.toml's, less what placing the part costs in z."""
