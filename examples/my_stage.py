@@ -94,6 +94,6 @@ class MyStage:
         for axis, value in zip(self._axes, goal, strict=True):
             if not axis.lower <= value <= axis.upper:
                 raise TravelError(
-                    f"target {value:.3f} of axis {axis.name} is outside its travel {axis.lower:g} to {axis.upper:g} mm"
+                    f"target {value:.3f} mm of axis {axis.name} is outside {axis.lower:.3f} to {axis.upper:.3f} mm."
                 )
         return goal
