@@ -172,7 +172,7 @@ class Hand:
 
     def complaints(self) -> list[str]:
         """Return what the browser's console complained about, drawing speed aside."""
-        quiet = ["GPU stall", "GL Driver Message", "software WebGL"]
+        quiet = ["GPU stall", "GL Driver Message", "software WebGL", "Canvas2D: Multiple readback"]
         quiet += ["status of 400", "status of 409"] if self.refusals_expected else []
         said = [str(entry["message"]) for entry in self.driver.get_log("browser")]
         return [line for line in said if not any(word in line for word in quiet)]

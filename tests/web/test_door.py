@@ -194,7 +194,7 @@ def test_upload_is_checked_and_never_overwrites(served, inspection):
 
 
 def test_hundred_quick_clicks_on_every_button_start_one_job(served, inspection):
-    behave(inspection, ticks=40, tick_s=0.05)
+    behave(inspection, ticks=2000, tick_s=0.05)
     visitor = served.visitor()
     for click in (
         lambda _: visitor.run("plate-1", "surface"),

@@ -54,7 +54,7 @@ def test_operator_walks_from_new_inspection_to_report(tmp_path, serve):
 
 
 def begin(hand: Hand, inspection: Inspection) -> None:
-    assert "No inspection yet" in hand.text("#main")
+    hand.wait(lambda: "No inspection yet" in hand.text("#main"))
     hand.picture("empty")
     hand.type("#new-name", NAME)
     hand.click("#new")

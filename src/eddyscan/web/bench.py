@@ -5,24 +5,14 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from eddyscan.core.errors import InputError, WorkError
 from eddyscan.web.child import Child
-from eddyscan.web.placing import COLUMNS
+from eddyscan.web.job import STEPS, TITLES, Job
 
-STEPS = ("views", "surface", "plan", "check", "record", "cscan", "report")
-TITLES = {
-    "views": "Views",
-    "surface": "Surface",
-    "plan": "Plan",
-    "check": "Align",
-    "record": "Scan",
-    "cscan": "Results",
-    "report": "Report",
-}
 LOG_KEPT = 300
 LINE = "eddyscan.pipeline"
 
@@ -33,45 +23,6 @@ class RigChoice:
 
     file: Path | None = None
     arm: bool = False
-
-
-@dataclass
-class Job:
-    """The work under way, or the last one."""
-
-    number: int
-    folder: str
-    step: str
-    state: str = "running"  # running, paused, stopping, done, stopped, failed
-    what: str = ""
-    done: float = 0.0
-    total: float = 0.0
-    seconds_left: float | None = None
-    message: str = ""
-    began: float = field(default_factory=time.monotonic)
-    what_began: float = field(default_factory=time.monotonic)
-    what_done: float = 0.0
-
-    @property
-    def active(self) -> bool:
-        """Tell whether the worker is still at it."""
-        return self.state in ("running", "paused", "stopping")
-
-    def told(self) -> dict[str, Any]:
-        """Return what a page shows of it."""
-        shown = asdict(self)
-        for inner in ("began", "what_began", "what_done"):
-            del shown[inner]
-        return shown | {"title": TITLES[self.step], "active": self.active, "seconds": time.monotonic() - self.began}
-
-    def progressed(self, what: str, done: float, total: float) -> None:
-        """Take progress and guess the time left from the pace so far."""
-        now = time.monotonic()
-        if what != self.what:
-            self.what, self.what_began, self.what_done = what, now, done
-        gained = done - self.what_done
-        self.done, self.total = done, total
-        self.seconds_left = (now - self.what_began) * (total - done) / gained if gained > 0 else None
 
 
 class Bench:
@@ -266,6 +217,3 @@ class Bench:
         self._stop_asked = None
         self.revision += 1
         self._on_change()
-
-
-__all__ = ["COLUMNS", "STEPS", "TITLES", "Bench", "Job", "RigChoice"]

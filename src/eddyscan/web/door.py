@@ -20,6 +20,7 @@ from eddyscan.core.errors import InputError
 from eddyscan.web.access import Access
 from eddyscan.web.asking import Asking
 from eddyscan.web.bench import Bench, RigChoice
+from eddyscan.web.priority import first_in_line
 
 MAX_HEADER_BYTES = 16 << 10
 MAX_BODY_BYTES = 1 << 20
@@ -60,7 +61,7 @@ class Door:
 
 def application(door: Door) -> tornado.web.Application:
     """Return the handlers with their addresses."""
-    from eddyscan.web import live, requests
+    from eddyscan.web import live, receiving, requests
 
     given = {"door": door}
     routes: list[Any] = [
@@ -69,7 +70,7 @@ def application(door: Door) -> tornado.web.Application:
         (r"/static/([a-z0-9_-]+\.(?:js|css|svg))", requests.Static, given),
         (r"/api/ask", requests.Ask, given),
         (r"/api/do", requests.Do, given),
-        (r"/api/upload", requests.Upload, given),
+        (r"/api/upload", receiving.Upload, given),
         (r"/file/([A-Za-z0-9_-]+)", requests.Ticket, given),
         (r"/live", live.Live, given),
     ]
@@ -132,6 +133,7 @@ async def open_door(
         idle_connection_timeout=IDLE_S,
         body_timeout=IDLE_S,
     )
+    first_in_line()
     await library.start()
     await bench.start()
     server.add_sockets(sockets)

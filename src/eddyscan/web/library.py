@@ -18,6 +18,7 @@ from eddyscan.core.errors import EddyscanError, InputError
 from eddyscan.core.parts import PARTS
 from eddyscan.web import decisions, figures, scenes, settings, uploads
 from eddyscan.web.link import Link
+from eddyscan.web.priority import like_everybody
 from eddyscan.web.shelf import Shelf
 
 NICENESS = 10
@@ -155,6 +156,7 @@ def serve(link: Link, library: Library) -> None:
 
 def main() -> None:
     """Run as a helper process."""
+    like_everybody()
     os.nice(NICENESS)
     try:
         serve(Link.of_descriptor(int(sys.argv[1])), Library(Path(json.loads(sys.argv[2]))))

@@ -17,8 +17,8 @@ import tornado.websocket
 from eddyscan.core.errors import EddyscanError
 from eddyscan.web.access import OPERATOR
 from eddyscan.web.door import MAX_PAGES, Door
+from eddyscan.web.guarded import foreign
 from eddyscan.web.link import framed
-from eddyscan.web.requests import foreign
 
 PERIOD_S = 0.1
 IDLE_PERIOD_S = 1.0

@@ -23,6 +23,7 @@ from eddyscan.core.errors import EddyscanError, ScanAborted
 from eddyscan.pipeline.control import ScanControl
 from eddyscan.web.link import Link
 from eddyscan.web.outbox import Outbox
+from eddyscan.web.priority import first_in_line, like_everybody
 
 SWITCH_INTERVAL_S = 0.001
 GIVE_UP_S = 5.0
@@ -52,6 +53,7 @@ class Worker:
                 continue
 
     def _listen(self) -> None:
+        first_in_line()
         for message in self._link.messages():
             getattr(self, f"_on_{message['do']}")(message)
         self._stop_work()
@@ -139,6 +141,7 @@ def unforeseen(what: str, error: BaseException) -> str:
 
 def main() -> None:
     """Run as a helper process."""
+    like_everybody()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     link = Link.of_descriptor(int(sys.argv[1]))
     Worker(link, importlib.import_module(sys.argv[2])).serve()

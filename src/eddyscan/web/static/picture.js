@@ -63,7 +63,8 @@ export class Picture {
       else this.forget(scene);
     }
     const spots = this.app.overview.indications.flatMap((one) => one.centre_mm);
-    this.viewer.setPoints("called", new Float32Array(spots), [255, 255, 255], { px: 13, lift: 0.006 });
+    if (spots.length) this.viewer.setPoints("called", new Float32Array(spots), [255, 255, 255], { px: 13, lift: 0.006 });
+    else this.viewer.set("called", null);
     this.show(this.bench.step);
   }
 
