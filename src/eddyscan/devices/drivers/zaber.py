@@ -48,7 +48,7 @@ class ZaberStage:
             self._link.close()
             raise
         where = (settings.host, settings.port) if settings.host else str(settings.serial_port)
-        self._dead_man = DeadMan(where, b"/stop\n") if settings.dead_man else None
+        self._dead_man = DeadMan(where, self._last_words()) if settings.dead_man else None
 
     # -- who it is ---------------------------------------------------------------
 
@@ -194,6 +194,15 @@ class ZaberStage:
                 self._give_up(going)
             if left <= 0 and expected_s is not None:
                 self.clock.sleep(SOON_S)
+
+    def _last_words(self) -> bytes:
+        """Return what stops all axes and lifts z: axes that brake each on its own leave the path, z must go up."""
+        up = [
+            f"/{a.table.device} {a.table.axis} move abs {a.reported['limit.min' if a.table.inverted else 'limit.max']}\n"
+            for a in self._axes
+            if a.table.name == "z"
+        ]
+        return ("/stop\n" + "".join(up)).encode()
 
     def _look(self, axis: ConnectedAxis) -> Told:
         told = self._ask(axis, "get pos")
