@@ -50,3 +50,28 @@ def test_what_the_axes_cannot_reach_is_left_out_and_listed():
 def test_a_margin_that_eats_the_part_is_refused():
     with pytest.raises(GeometryError, match=r"nothing is left to scan: margin 60 mm"):
         plan(named_part("plate").top_mesh(2.0), technique(margin_mm=60.0))
+
+
+def test_only_the_drawn_regions_are_scanned_each_kept_apart():
+    regions = [[(20, 20), (60, 20), (60, 60), (20, 60)], [(120, 40), (180, 40), (150, 90)]]
+    result = plan(named_part("block-a").top_mesh(1.0), technique(regions_mm=regions))
+    x, y = result.surface_mm[result.is_scan, :2].T
+    square = (x > 19.9) & (x < 60.1) & (y > 19.9) & (y < 60.1)
+    triangle = (y > 39.9) & (y < 90.1) & (x > 119.9) & (x < 180.1)
+    assert (square ^ triangle).all()
+    assert square.any()
+    assert triangle.any()
+    for row in np.unique(result.row):
+        own = result.is_scan & (result.row == row)
+        assert len({bool(x > 90) for x in result.surface_mm[own, 0]}) == 1
+    assert result.coverage.swept > 0.99
+    with pytest.raises(ValueError, match=r"regions_mm\[0\] has 2 corners, an outline needs at least 3"):
+        technique(regions_mm=[[(0, 0), (1, 1)]])
+
+
+def test_encircling_a_dome_keeps_rings_a_pitch_apart_on_the_surface():
+    result = plan(
+        named_part("dome").top_mesh(1.0), technique(strategy="encircle", machine="pose", margin_mm=3.0), allow_gaps=True
+    )
+    assert result.coverage.swept > 0.97
+    assert abs(result.coverage.row_distance_mm[1] - 5.0) < 0.3

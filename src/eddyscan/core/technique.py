@@ -118,6 +118,16 @@ class Plan(Section):
     density: Literal["constant", "adaptive"] = "constant"
     chord_error_mm: float = Field(0.05, gt=0, description="bound for density = adaptive")
     coverage_min: float = Field(0.95, ge=0, le=1, description="least swept coverage of the region inside the margin")
+    regions_mm: tuple[tuple[tuple[float, float], ...], ...] = Field(
+        (), description="outlines of what to scan, (x, y) corners in the part frame; none: all"
+    )
+
+    @model_validator(mode="after")
+    def _outlines(self) -> Plan:
+        for number, outline in enumerate(self.regions_mm):
+            if len(outline) < 3:
+                raise ValueError(f"regions_mm[{number}] has {len(outline)} corners, an outline needs at least 3")
+        return self
 
 
 class Scan(Section):

@@ -4,42 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 
-from eddyscan.core.errors import GeometryError
 from eddyscan.core.frames import Array, BoolArray
 from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.topology import Edges
 
-STEEPEST = 4.0
+# Rings run level round a slope, so all of a ring may be stretched; planes only touch theirs.
+STEEPEST_PLANE, STEEPEST_RING = 4.0, 20.0
 # Rows may lie this much further apart when that saves one.
 STRETCH = 0.0005
 
 
-def plane_levels(
-    surface: SmoothSurface, axis: int, pitch_mm: float, inside: BoolArray, span_mm: tuple[float, float]
+def spread_levels(
+    at: Array, along: Array, pitch_mm: float, span_mm: tuple[float, float], *, steepest: float = STEEPEST_PLANE
 ) -> Array:
-    """Return plane positions along an axis whose rows are at most a pitch apart on the surface.
+    """Return positions of planes or rings whose rows are at most a pitch apart on the surface.
 
     Parameters
     ----------
-    surface : SmoothSurface
-    axis : 0, 1 or 2
+    at : (V,) [mm], position of each vertex across the rows
+    along : (V,) part of its normal in the direction across the rows
     pitch_mm : float, distance between rows on the surface
-    inside : (V,) bool, vertices the rows are laid for
     span_mm : least and largest position of the region
+    steepest : float, largest factor by which the surface is longer than the positions are apart
 
     Notes
     -----
     Along the steepest way between two planes the surface is 1 / sqrt(1 - n_a^2)
-    as long as the planes are apart (n_a: the normal's part along the axis).
-    Nine tenths of every row keep the pitch; where the surface runs along the
-    planes the factor is held at 4.
+    as long as the planes are apart (n_a: the normal's part across them). Nine
+    tenths of every row keep the pitch.
     """
-    at = surface.vertices[inside, axis]
     if at.size == 0:
         return np.empty(0)
-    stretch = np.minimum(1 / np.sqrt(np.maximum(1 - surface.normals[inside, axis] ** 2, 1e-6)), STEEPEST)
+    stretch = np.minimum(1 / np.sqrt(np.maximum(1 - along**2, 1e-6)), steepest)
     low, high = span_mm
-    edges = np.linspace(low, high, max(2, int(np.ceil((high - low) / min(2.0, pitch_mm)))) + 1)
+    edges = np.linspace(low, high, max(2, int(np.ceil((high - low) / min(1.0, pitch_mm / 2)))) + 1)
     cell = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, len(edges) - 2)
     order = np.lexsort((stretch, cell))
     last = np.searchsorted(cell[order], np.arange(len(edges) - 1), side="right") - 1
@@ -56,13 +54,12 @@ def even_levels(low: float, high: float, pitch_mm: float) -> Array:
     return low + (np.arange(n) + 0.5) * (high - low) / n
 
 
-def ring_field(surface: SmoothSurface, inside: BoolArray) -> Array:
-    """Return each vertex's distance (V,) [mm] from the vertical axis through the middle of the region."""
-    if not inside.any():
-        raise GeometryError("the margin leaves nothing to encircle. Lower the margin.")
+def ring_field(surface: SmoothSurface, inside: BoolArray) -> tuple[Array, Array]:
+    """Return distances from the vertical axis through the region's middle, and normals' parts that way (V,)."""
     xy = surface.vertices[inside, :2]
-    centre = (xy.min(axis=0) + xy.max(axis=0)) / 2
-    return np.asarray(np.linalg.norm(surface.vertices[:, :2] - centre, axis=1))
+    out = surface.vertices[:, :2] - (xy.min(axis=0) + xy.max(axis=0)) / 2
+    distance = np.linalg.norm(out, axis=1)
+    return distance, np.einsum("vk,vk->v", surface.normals[:, :2], out / np.maximum(distance, 1e-9)[:, None])
 
 
 def span_inside(field: Array, guard: Array, edges: Edges) -> tuple[float, float]:

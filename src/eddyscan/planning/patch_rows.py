@@ -86,10 +86,11 @@ class _Laying:
         inside = self.samples.of(guard, self.surface.faces) > 0
         distance = self._distance(strokes)
         blocked = inside & self._blocked(lost, distance)
+        brink = self._near(lost) < settings.pitch_mm
         if settings.strategy == "geodesic":
             at = self.samples.of(self.rows.field[: len(guard)], self.surface.faces)
             for _ in range(FILL_ROUNDS):
-                open_to = np.where(inside & ~blocked, distance, 0.0)
+                open_to = np.where(inside & ~blocked & ~brink, distance, 0.0)
                 gaps = gaps_between(self.samples, open_to, at, settings.pitch_mm)
                 found = [line_through(gap, self.rows.lines_at, settings.step_mm) for gap in gaps]
                 extra, _ = self._strokes([line for line in found if line is not None])
@@ -114,12 +115,17 @@ class _Laying:
             return strokes, np.empty((0, 3))
         cuts = np.cumsum([len(stroke.points) for stroke in strokes])[:-1]
         kept = [part for s, mask in zip(strokes, np.split(free, cuts), strict=True) for part in parts_of(s, mask)]
-        return kept, points[~free]
+        read = {tuple(spot) for part in kept for spot in part.points.tolist()}
+        lost = np.array([spot for spot in points.tolist() if tuple(spot) not in read]).reshape(-1, 3)
+        return kept, lost
 
     def _blocked(self, lost: Array, distance: Array) -> BoolArray:
         """Return the samples left out because the readings that would cover them cannot be taken."""
-        if len(lost) == 0:
-            return np.zeros(len(distance), dtype=bool)
-        near = np.asarray(KDTree(lost).query(self.samples.points)[0])
         reach = self.technique.plan.pitch_mm + self.technique.plan.step_mm
-        return np.asarray((distance > self.samples.reach_mm) & (near < np.minimum(distance, reach)))
+        return np.asarray((distance > self.samples.reach_mm) & (self._near(lost) < np.minimum(distance, reach)))
+
+    def _near(self, lost: Array) -> Array:
+        """Return each sample's distance (N,) to the nearest spot that cannot be read."""
+        if len(lost) == 0:
+            return np.full(len(self.samples.points), np.inf)
+        return np.asarray(KDTree(lost).query(self.samples.points)[0])

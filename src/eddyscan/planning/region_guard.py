@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.path import Path as Outline
 
 from eddyscan.core.frames import Array, BoolArray
 from eddyscan.core.plan import Uncovered
@@ -39,6 +40,21 @@ def hidden_guard(surface: SmoothSurface, heights: HeightMap) -> Array:
     # Within a cell of the map the surface itself rises by the slope.
     own = HIDDEN_MM + 1.5 * heights.cell_mm * np.sqrt(1 - up**2) / up
     return np.asarray(own - (heights.at(surface.vertices[:, 0], surface.vertices[:, 1]) - surface.vertices[:, 2]))
+
+
+def drawn_guard(surface: SmoothSurface, outlines: tuple[tuple[tuple[float, float], ...], ...]) -> Array:
+    """Return how far (V,) [mm, in the plan view] each vertex is inside the nearest drawn outline."""
+    xy = surface.vertices[:, :2]
+    best = np.full(len(xy), -np.inf)
+    for outline in outlines:
+        corners = np.asarray(outline, dtype=np.float64)
+        a, d = corners, np.roll(corners, -1, axis=0) - corners
+        t = np.einsum("vek,ek->ve", xy[:, None] - a, d) / np.maximum(np.einsum("ek,ek->e", d, d), 1e-12)
+        foot = a + np.clip(t, 0, 1)[..., None] * d
+        distance = np.linalg.norm(xy[:, None] - foot, axis=2).min(axis=1)
+        inside = Outline(corners).contains_points(xy)
+        best = np.maximum(best, np.where(inside, distance, -distance))
+    return best
 
 
 def left_out(guards: list[Guard], samples: Samples, surface: SmoothSurface) -> list[Uncovered]:

@@ -17,7 +17,7 @@ from eddyscan.planning.heights import HeightMap, height_map
 from eddyscan.planning.patches import Patch, patches_of
 from eddyscan.planning.probe_pose import Stance, normal_stance, vertical_stance
 from eddyscan.planning.region import border_distance, faces_seen_from_above, steepest_tilt_deg, travel_guard
-from eddyscan.planning.region_guard import Guard, hidden_guard, tilt_guard
+from eddyscan.planning.region_guard import Guard, drawn_guard, hidden_guard, tilt_guard
 from eddyscan.planning.route import AroundLinks, LevelLinks
 from eddyscan.planning.smooth import SmoothSurface
 from eddyscan.planning.topology import edges_of
@@ -108,6 +108,8 @@ class Setting:
         guards = []
         if margin > 0:
             guards.append(Guard(f"edge zone of {margin:g} mm", border_distance(patch) - margin))
+        if self.technique.plan.regions_mm:
+            guards.append(Guard("outside the drawn regions", drawn_guard(surface, self.technique.plan.regions_mm)))
         if self.heights is not None:
             guards.append(Guard(_steep(self.tilt_limit_deg), tilt_guard(surface, self.tilt_limit_deg)))
             guards.append(Guard("hidden from above", hidden_guard(surface, self.heights)))

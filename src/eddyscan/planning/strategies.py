@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 from eddyscan.core.frames import Array, IntArray
 from eddyscan.core.technique import Plan
-from eddyscan.planning.families import even_levels, plane_levels, ring_field, span_inside
+from eddyscan.planning.families import (
+    STEEPEST_PLANE,
+    STEEPEST_RING,
+    even_levels,
+    ring_field,
+    span_inside,
+    spread_levels,
+)
 from eddyscan.planning.geodesic import distance_from, field_mesh, guarded
 from eddyscan.planning.levels import Line, clipped, level_lines
 from eddyscan.planning.loops import fitted_loops
@@ -59,14 +66,15 @@ def row_fields(surface: SmoothSurface, settings: Plan, guard: Array) -> Iterator
         yield from _geodesic(surface, settings, guard)
         return
     edges = edges_of(surface.faces)
-    field = ring_field(surface, inside) if settings.strategy == "encircle" else surface.vertices[:, ALONG_X]
-    low, high = span_inside(field, guard, edges)
+    field, along = surface.vertices[:, ALONG_X], surface.normals[:, ALONG_X]
     if settings.strategy == "encircle":
-        levels = even_levels(0.0, high, settings.pitch_mm)
-    elif settings.strategy == "grid":
+        field, along = ring_field(surface, inside)
+    low, high = span_inside(field, guard, edges)
+    if settings.strategy == "grid":
         levels = even_levels(low, high, settings.pitch_mm)
     else:
-        levels = plane_levels(surface, ALONG_X, settings.pitch_mm, inside, (low, high))
+        steepest = STEEPEST_RING if settings.strategy == "encircle" else STEEPEST_PLANE
+        levels = spread_levels(field[inside], along[inside], settings.pitch_mm, (low, high), steepest=steepest)
     yield RowField(surface.vertices, surface.faces, edges, field, guard, levels)
 
 

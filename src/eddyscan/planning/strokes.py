@@ -18,6 +18,7 @@ SPACING_OF_STEP = 0.008
 # Pieces shorter than this are read once, in their middle.
 ONE_POINT_OF_STEP = 0.5
 SPECK_OF_STEP = 0.02
+SHORTEST_RUN = 3
 # How far an adaptive step may shrink or grow.
 SHORTEST_OF_STEP, LONGEST_OF_STEP = 0.25, 2.0
 
@@ -127,4 +128,7 @@ def parts_of(stroke: Stroke, keep: BoolArray) -> list[Stroke]:
     s = np.concatenate([[0.0], np.cumsum(surface_distance(points[:-1], points[1:], normals[:-1], normals[1:]))])
     edge = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
     runs = zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True)
-    return [Stroke(points[a:b], normals[a:b], s[a:b] - s[a], stroke.level, False) for a, b in runs]
+    # At the brink of what can be read the answer flickers: a link to a stray reading costs more than it tells.
+    return [
+        Stroke(points[a:b], normals[a:b], s[a:b] - s[a], stroke.level, False) for a, b in runs if b - a >= SHORTEST_RUN
+    ]
