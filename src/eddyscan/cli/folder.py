@@ -83,9 +83,13 @@ def analyse(folder: Path = Folder, json: bool = Json) -> None:
     _single_step(folder, "cscan", json)
 
 
-def report(folder: Path = Folder, json: bool = Json) -> None:
+def report(
+    folder: Path = Folder,
+    pdf: bool = typer.Option(False, "--pdf", help="Write report.pdf too: the same chapters on paper."),
+    json: bool = Json,
+) -> None:
     """Write the folder's report.html."""
-    _single_step(folder, "report", json)
+    _single_step(folder, "report", json, pdf=pdf)
 
 
 def status(folder: Path = Folder, json: bool = Json) -> None:

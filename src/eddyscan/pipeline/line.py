@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +63,16 @@ def states(folder: Path) -> list[StepState]:
     return states_of(Inspection.open(folder))
 
 
+@dataclass(frozen=True)
+class _Wishes:
+    """How the steps of one call are to be done."""
+
+    dry_run: bool = False
+    pdf: bool = False
+    progress: Progress = silent
+    control: ScanControl | None = None
+
+
 def run(
     folder: Path,
     *,
@@ -71,9 +83,14 @@ def run(
     control: ScanControl | None = None,
 ) -> dict[str, Any]:
     """Do every missing or stale step and return the summary."""
-    return _run_steps(
-        folder, STEPS, rig_file=rig_file, arm=arm, dry_run=dry_run, progress=progress, control=control, only_needed=True
-    )
+    wishes = _Wishes(dry_run=dry_run, progress=progress, control=control)
+    with _rig_of(folder, rig_file, arm) as (inspection, rig):
+        for step in STEPS:
+            if _state(inspection, step) != "done":
+                _do(step, inspection, rig, wishes)
+            if dry_run and step == "record":
+                break
+        return write_summary(inspection, rig)
 
 
 def single_step(
@@ -83,46 +100,28 @@ def single_step(
     rig_file: Path | None = None,
     arm: bool = False,
     dry_run: bool = False,
+    pdf: bool = False,
     progress: Progress = silent,
     control: ScanControl | None = None,
 ) -> dict[str, Any]:
     """Do one step of a folder, whatever its state; the steps before it must be there."""
-    return _run_steps(
-        folder,
-        (step,),
-        rig_file=rig_file,
-        arm=arm,
-        dry_run=dry_run,
-        progress=progress,
-        control=control,
-        only_needed=False,
-    )
+    wishes = _Wishes(dry_run=dry_run, pdf=pdf, progress=progress, control=control)
+    with _rig_of(folder, rig_file, arm) as (inspection, rig):
+        _do(step, inspection, rig, wishes)
+        return write_summary(inspection, rig)
 
 
-def _run_steps(
-    folder: Path,
-    wanted: tuple[str, ...],
-    *,
-    rig_file: Path | None,
-    arm: bool,
-    dry_run: bool,
-    progress: Progress,
-    control: ScanControl | None,
-    only_needed: bool,
-) -> dict[str, Any]:
+@contextmanager
+def _rig_of(folder: Path, rig_file: Path | None, arm: bool) -> Iterator[tuple[Inspection, rigs.LazyRig]]:
+    """Hold the folder for this call and close its rig at the end, if a step opened it."""
     inspection = Inspection.open(folder)
     inspection.technique()
     with inspection.locked(), ExitStack() as stack:
-        rig = rigs.LazyRig(inspection, rig_file, arm, stack)
-        for step in wanted:
-            state = next(s for s in states_of(inspection) if s.name == step)
-            if only_needed and state.state == "done":
-                continue
-            _require_earlier(inspection, step)
-            _do(step, inspection, rig, dry_run=dry_run, progress=progress, control=control)
-            if dry_run and step == "record":
-                break
-        return write_summary(inspection, rig)
+        yield inspection, rigs.LazyRig(inspection, rig_file, arm, stack)
+
+
+def _state(inspection: Inspection, step: str) -> str:
+    return next(state.state for state in states_of(inspection) if state.name == step)
 
 
 def _require_earlier(inspection: Inspection, step: str) -> None:
@@ -136,15 +135,9 @@ def _require_earlier(inspection: Inspection, step: str) -> None:
             )
 
 
-def _do(
-    step: str,
-    inspection: Inspection,
-    rig: rigs.LazyRig,
-    *,
-    dry_run: bool,
-    progress: Progress,
-    control: ScanControl | None,
-) -> None:
+def _do(step: str, inspection: Inspection, rig: rigs.LazyRig, wishes: _Wishes) -> None:
+    _require_earlier(inspection, step)
+    progress = wishes.progress
     match step:
         case "views":
             steps.take_views(inspection, rig.open(), progress)
@@ -153,8 +146,8 @@ def _do(
         case "plan":
             steps.make_plan(inspection, rig.travel_mm(), progress)
         case "record":
-            scan_plan(inspection, rig.open(), dry_run=dry_run, progress=progress, control=control)
+            scan_plan(inspection, rig.open(), dry_run=wishes.dry_run, progress=progress, control=wishes.control)
         case "cscan":
             steps.analyse_record(inspection, progress)
         case _:
-            write_report(inspection, rig, progress)
+            write_report(inspection, rig, progress, pdf=wishes.pdf)

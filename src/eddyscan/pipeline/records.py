@@ -8,24 +8,36 @@ from typing import Any
 import numpy as np
 
 from eddyscan.core.frames import Array
+from eddyscan.core.record import ScanRecord
 from eddyscan.inspection import Inspection
 
 
 def export_inspection(folder: Path, format_name: str, out: Path) -> dict[str, Any]:
-    """Write the record of an inspection folder; lift-off comes from its analysis when that is up to date."""
+    """Write the record of an inspection folder, with lift-off and C-scan when it has been analysed."""
+    from eddyscan.formats.record_ply import read_cscan_ply
+    from eddyscan.formats.records import read_record
+
     inspection = Inspection.open(folder)
-    record_file = inspection.file("record", "record.sqlite")
-    return export_record_file(record_file, format_name, out, _lift_off(inspection))
+    record = read_record(inspection.file("record", "record.sqlite"))
+    lift_off_mm, cscan = _lift_off(inspection), inspection.file("cscan", "cscan.ply")
+    if lift_off_mm is None or len(lift_off_mm) != len(record):
+        return _export(record, format_name, out)
+    return _export(record, format_name, out, lift_off_mm=lift_off_mm, cscan=read_cscan_ply(cscan))
 
 
-def export_record_file(source: Path, format_name: str, out: Path, lift_off_mm: Array | None = None) -> dict[str, Any]:
-    """Write a record file in another format."""
-    from eddyscan.formats.records import export_record, read_record
+def export_record_file(source: Path, format_name: str, out: Path) -> dict[str, Any]:
+    """Write a record file (.sqlite, .nde, or .csv made here or elsewhere) in another format."""
+    from eddyscan.formats.record_nde import read_nde
+    from eddyscan.formats.records import read_record, read_record_csv
 
-    record = read_record(source)
-    if lift_off_mm is not None and len(lift_off_mm) != len(record):
-        lift_off_mm = None
-    written = export_record(record, format_name, out, lift_off_mm=lift_off_mm)
+    readers = {".csv": read_record_csv, ".nde": read_nde}
+    return _export(readers.get(source.suffix.lower(), read_record)(source), format_name, out)
+
+
+def _export(record: ScanRecord, format_name: str, out: Path, **extras: Any) -> dict[str, Any]:
+    from eddyscan.formats.records import export_record
+
+    written = export_record(record, format_name, out, **extras)
     return {"format": format_name, "entries": len(record), "file": str(written)}
 
 

@@ -6,6 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from eddyscan import __version__
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.plan import ScanPlan
@@ -20,7 +22,7 @@ from eddyscan.pipeline.truth import keep_truth_log
 if TYPE_CHECKING:
     from eddyscan.devices.rig import Rig
 
-COARSE, FINE = "plan-coarse.json", "plan-fine.json"
+COARSE, FINE, COARSE_LIFT_OFF = "plan-coarse.json", "plan-fine.json", "coarse-lift-off.npz"
 
 
 def scan_plan(
@@ -128,6 +130,7 @@ class _Passes:
         def corrected() -> ScanPlan:
             record = read_record(self._file("record.sqlite"), scan_pass=0)
             result = analyse(record, mesh, self._technique, progress=self._progress)
+            np.savez_compressed(self._file(COARSE_LIFT_OFF), lift_off_mm=result.lift_off_mm)
             return corrected_plan(plan, record, result, self._technique, mesh=mesh)
 
         return self._kept(FINE, corrected)

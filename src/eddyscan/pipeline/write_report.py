@@ -17,7 +17,7 @@ from eddyscan.core.technique import Technique
 from eddyscan.inspection import Inspection, read_json, sha256_of
 from eddyscan.pipeline.files import nominal_of
 from eddyscan.pipeline.rigs import LazyRig
-from eddyscan.pipeline.scan import FINE
+from eddyscan.pipeline.scan import COARSE_LIFT_OFF, FINE
 from eddyscan.pipeline.states import OUTPUTS, inputs_of, states_of
 from eddyscan.pipeline.steps import step_summary
 from eddyscan.pipeline.truth import truth_of
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from eddyscan.report import NominalComparison, ReportContent
 
 
-def write_report(inspection: Inspection, rig: LazyRig, progress: Progress) -> None:
-    """Render report.html from whatever steps there are."""
-    from eddyscan.report import render_html
+def write_report(inspection: Inspection, rig: LazyRig, progress: Progress, *, pdf: bool = False) -> None:
+    """Render report.html, and report.pdf when asked for, from whatever steps there are."""
+    from eddyscan.report import render_html, render_pdf
 
     started, inputs = datetime.now(UTC), inputs_of(inspection, "report")
     progress("report", 0, 2)
@@ -37,6 +37,8 @@ def write_report(inspection: Inspection, rig: LazyRig, progress: Progress) -> No
     progress("report", 1, 2)
     with inspection.writing("report", inputs, started) as folder:
         (folder / "report.html").write_text(render_html(content), encoding="utf-8")
+        if pdf:
+            (folder / "report.pdf").write_bytes(render_pdf(content))
     progress("report", 2, 2)
 
 
@@ -84,8 +86,10 @@ def _scanned(inspection: Inspection) -> dict[str, Any]:
         lift_off_mm, residual_ohm = arrays["lift_off_mm"], arrays["residual_ohm"]
     if len(lift_off_mm) != len(record):
         return {"record": record}
+    coarse = inspection.file("record", COARSE_LIFT_OFF)
     return {
         "record": record,
+        "coarse_lift_off_mm": np.load(coarse)["lift_off_mm"] if coarse.is_file() else None,
         "cscan": read_cscan_ply(inspection.file("cscan", "cscan.ply")),
         "indications": _indications(inspection),
         "lift_off_mm": lift_off_mm,
