@@ -201,3 +201,12 @@ class TestZaberPaths(PathContract):
 def test_a_chain_refuses_timed_points(cell):
     with pytest.raises(MotionError, match="this stage follows paths as row, not as pvt"):
         cell.stage.start_path(wave_path(HERE), "pvt")
+
+
+def test_the_dead_man_stops_all_axes_and_lifts_the_probe(cell):
+    cell.stage.move(THERE)
+    for line in cell.stage._last_words().splitlines(keepends=True):
+        cell.simulator.answer(line)
+    cell.clock.sleep(5.0)
+    assert not cell.simulator.moving()
+    assert cell.simulator.true_position()[2] > 39.9

@@ -197,12 +197,12 @@ class ZaberStage:
 
     def _last_words(self) -> bytes:
         """Return what stops all axes and lifts z: axes that brake each on its own leave the path, z must go up."""
-        up = [
-            f"/{a.table.device} {a.table.axis} move abs {a.reported['limit.min' if a.table.inverted else 'limit.max']}\n"
-            for a in self._axes
-            if a.table.name == "z"
-        ]
-        return ("/stop\n" + "".join(up)).encode()
+        up = ""
+        for axis in self._axes:
+            if axis.table.name == "z":
+                end = axis.reported["limit.min" if axis.table.inverted else "limit.max"]
+                up += f"/{axis.table.device} {axis.table.axis} move abs {end}\n"
+        return f"/stop\n{up}".encode()
 
     def _look(self, axis: ConnectedAxis) -> Told:
         told = self._ask(axis, "get pos")
