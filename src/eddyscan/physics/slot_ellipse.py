@@ -153,7 +153,8 @@ class EllipseBasis:
         places, count, heights, columns = samples.shape
         weights = self._weights(count).reshape(self.size, -1).T
         flat = np.asarray(samples.transpose(0, 2, 1, 3)).reshape(-1, count * columns)
-        return np.asarray((flat @ weights).reshape(places, heights, self.size))
+        values = flat.real @ weights + 1j * (flat.imag @ weights)
+        return np.asarray(values.reshape(places, heights, self.size))
 
     def _weights(self, count: int) -> Array:
         xi = chebyshev_nodes(1.0, count)

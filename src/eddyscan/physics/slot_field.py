@@ -14,7 +14,7 @@ from eddyscan.physics.coil import Coil, source, wave_numbers
 from eddyscan.physics.metal import SlottedMetal
 from eddyscan.physics.slot_basis import SlotBasis
 
-VALUES_PER_CHUNK = 4_000_000
+VALUES_PER_CHUNK = 1_000_000
 RADII_PER_MEAN_RADIUS = 80
 
 
@@ -91,12 +91,14 @@ class CoilOnSlot:
             dx = self._nodes - x_m[part, None]
             dy = np.broadcast_to(y_m[part, None], dx.shape)
             r = np.hypot(dx, dy)
-            across = self._sampled(self._across, r) * dx[..., None, None]
+            across = self._sampled(self._across, r)
+            across *= dx[..., None, None]
             yield part, Drive(self._basis.fold(across), self._along_values(r, dy))
 
     def _sampled(self, spline: BSpline, r: Array) -> ComplexArray:
         rows = BSpline.design_matrix(r.ravel(), spline.t, 3)
-        return np.asarray(rows @ spline.c).reshape(*r.shape, self._heights, -1)
+        values = np.asarray(rows @ np.ascontiguousarray(spline.c).view(np.float64)).view(np.complex128)
+        return values.reshape(*r.shape, self._heights, -1)
 
     def _along_values(self, r: Array, dy: Array) -> ComplexArray:
         if self._along is None or not dy.any():

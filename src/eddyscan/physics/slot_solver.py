@@ -85,8 +85,8 @@ class SlotSolver:
         """Return b'^T A^-1 b plus the along-slot term (P, H) [ohm] of two drives at the same positions."""
         total = np.zeros(driver.across.shape[:2], dtype=np.complex128)
         for which, inverse in self._blocks:  # even and odd functions along the slot do not react
-            one, other = driver.across[..., which], receiver.across[..., which]
-            total += np.einsum("phi,phi->ph", one @ inverse, other)
+            one, other = (drive.across[..., which].reshape(-1, len(which)) for drive in (driver, receiver))
+            total += np.einsum("ni,ni->n", one @ inverse, other).reshape(total.shape)
         if receiver.along.shape[2] and driver.along.shape[2]:
             total = total + np.einsum("phq,phq->ph", receiver.along, driver.along)
         return np.asarray(total)
