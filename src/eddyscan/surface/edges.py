@@ -52,6 +52,7 @@ def measure_edges(
     height: Height,
     *,
     pool_mm: float,
+    reach_mm: float = REACH_MM,
 ) -> EdgeOffsets:
     """Find the edge along every contour sample in every view.
 
@@ -64,8 +65,10 @@ def measure_edges(
     pool_mm : float
         Length along the contour over which pixels are pooled. Fattening comes in patches: over too short a
         length a patch looks like the edge.
+    reach_mm : float
+        Largest offset that is looked for.
     """
-    across = np.arange(-REACH_MM, REACH_MM + STEP_MM / 2, STEP_MM)
+    across = np.arange(-reach_mm, reach_mm + STEP_MM / 2, STEP_MM)
     xy = contour[:, None] + across[None, :, None] * normal[:, None]
     z = height(xy.reshape(-1, 2))
     points = np.concatenate([xy.reshape(-1, 2), z[:, None]], axis=1)

@@ -80,7 +80,7 @@ def _footprint_contour(points: Array) -> Array:
     solid = (count >= max(1.0, 0.15 * typical)).astype(np.uint8)
     solid = cv2.morphologyEx(np.pad(solid, BRIDGE), cv2.MORPH_CLOSE, np.ones((BRIDGE, BRIDGE), np.uint8))
     solid = solid[BRIDGE:-BRIDGE, BRIDGE:-BRIDGE]
-    solid = cv2.morphologyEx(solid, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+    solid = cv2.morphologyEx(solid, cv2.MORPH_OPEN, np.ones((9, 9), np.uint8))
     contours, _ = cv2.findContours(solid, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         raise GeometryError(

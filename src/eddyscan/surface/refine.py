@@ -21,6 +21,9 @@ from eddyscan.surface.surfels import SurfelImage
 
 LEVER_MM = 100.0  # rotations are scaled by this length, so all unknowns are mm
 TABLE_WEIGHT = 0.3
+INFLATION = 60.0  # neighbouring pixels share their noise: this many count as one
+NOISE_MEDIAN = 2.77  # median of |n_a - n_b|^2 over the variance of one tangential component
+SEARCH_INFORMATION = (1e-4, 1e-4, 1.0, 1.0, 1.0, 1e-4)  # 1/mm^2: the search places x, y and yaw within a millimetre
 SCALE_FLOOR_MM = 0.05  # quantised depth has zero median deviation: a robust scale needs a floor
 NORMAL_COSINE = 0.8
 OBJECT_SAMPLES = 3500
@@ -92,11 +95,22 @@ def _draw(chance: Array, limit: int, rng: np.random.Generator) -> NDArray[np.int
 
 @dataclass(frozen=True)
 class _Matches:
-    """Residuals of one ordered pair: (M,) distance [mm], (M, 6) row, (M,) weight."""
+    """Residuals of one ordered pair.
+
+    Attributes
+    ----------
+    distance : (M,) [mm]
+    row : (M, 6)
+    weight : (M,)
+    lever : (M, 3) place relative to the centre / LEVER_MM
+    noise : (M,) squared difference of the two views' normals
+    """
 
     distance: Array
     row: Array
     weight: Array
+    lever: Array
+    noise: Array
 
 
 def match(source: Samples, target: SurfelImage, T_a: Array, T_b: Array, centre: Array, gate_mm: float) -> _Matches:
@@ -115,9 +129,10 @@ def match(source: Samples, target: SurfelImage, T_a: Array, T_b: Array, centre: 
     good[good] = (np.abs(distance[good]) < gate_mm) & ((n[k][good] * m[good]).sum(axis=1) > NORMAL_COSINE)
     k, distance = k[good], distance[good]
     normal = rotate(T_b, m[good])
-    x = apply(T_a, source.points[k]) - centre
-    row = np.concatenate([np.cross(x, normal) / LEVER_MM, normal], axis=1)
-    return _Matches(distance, row, source.weight[k])
+    lever = (apply(T_a, source.points[k]) - centre) / LEVER_MM
+    row = np.concatenate([np.cross(lever, normal), normal], axis=1)
+    noise = ((rotate(T_a, source.normals[k]) - normal) ** 2).sum(axis=1)
+    return _Matches(distance, row, source.weight[k], lever, noise)
 
 
 def joint_refinement(
@@ -137,13 +152,14 @@ def joint_refinement(
     current = [T.copy() for T in poses]
     centre = np.median(np.concatenate([apply(T, s.points) for s, T in zip(samples, current, strict=True)]), axis=0)
     pairs = [(a, b) for a in range(len(images)) for b in range(len(images)) if a != b]
-    scale, converged = 0.5, False
+    scale, converged, moved = 0.5, False, np.zeros(6 * len(images))
     for step, gate in enumerate(GATES_MM):
         found = {(a, b): match(samples[a], images[b], current[a], current[b], centre, gate) for a, b in pairs}
         distance = np.concatenate([m.distance for m in found.values()])
         scale = max(SCALE_FLOOR_MM, 1.4826 * float(np.median(np.abs(distance)))) if distance.size else gate
         information, gradient = _normal_system(found, len(images), scale)
-        twist = _solve(information, gradient, reference)
+        twist = _solve(information, gradient, moved, reference)
+        moved += twist
         for k in range(len(images)):
             current[k] = _moved(current[k], twist[6 * k : 6 * k + 6], centre)
         converged = bool(np.abs(twist).max() < CONVERGED_MM)
@@ -166,13 +182,16 @@ def pair_quality(images: Sequence[SurfelImage], poses: Sequence[Array], *, seed:
 
 
 def _normal_system(found: dict[tuple[int, int], _Matches], views: int, scale: float) -> tuple[Array, Array]:
+    """Return the information matrix [1/mm^2] and gradient; neighbours share noise, so counts are deflated."""
     H, g = np.zeros((6 * views, 6 * views)), np.zeros(6 * views)
+    noise = np.concatenate([m.noise for m in found.values()])
+    variance = float(np.median(noise)) / NOISE_MEDIAN if noise.size else 0.0
     for (a, b), m in found.items():
         if not m.distance.size:
             continue
         tukey = np.clip(1 - (m.distance / (4.685 * scale)) ** 2, 0, None) ** 2
-        w = m.weight * tukey / scale**2
-        A = (m.row * w[:, None]).T @ m.row
+        w = m.weight * tukey / scale**2 / INFLATION
+        A = _without_noise((m.row * w[:, None]).T @ m.row, w, m.lever, variance)
         v = m.row.T @ (w * m.distance)
         sa, sb = slice(6 * a, 6 * a + 6), slice(6 * b, 6 * b + 6)
         H[sa, sa] += A
@@ -184,14 +203,29 @@ def _normal_system(found: dict[tuple[int, int], _Matches], views: int, scale: fl
     return H, g
 
 
-def _solve(H: Array, g: Array, reference: int) -> Array:
-    """Solve for all twists but the reference's; a hint of damping keeps unseen directions still."""
+def _without_noise(A: Array, weight: Array, lever: Array, variance: float) -> Array:
+    """Take out what the noise of the normals alone adds to a normal matrix.
+
+    A flat surface with noisy normals looks as if it held the part sideways.
+    With tangential noise of the given variance per direction the expected
+    excess is variance * sum w M (1 - n n') M', M = ([x]; 1), row = M n.
+    """
+    first = (weight[:, None] * lever).sum(axis=0)
+    second = (weight[:, None] * lever).T @ lever
+    cross = np.array([[0.0, -first[2], first[1]], [first[2], 0.0, -first[0]], [-first[1], first[0], 0.0]])
+    full = np.block([[np.trace(second) * np.eye(3) - second, cross], [cross.T, weight.sum() * np.eye(3)]])
+    values, vectors = np.linalg.eigh(A - variance * (full - A))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _solve(H: Array, g: Array, moved: Array, reference: int) -> Array:
+    """Solve for all twists but the reference's; where the surfaces say nothing the search's pose holds."""
     free = np.ones(len(g), dtype=bool)
     free[6 * reference : 6 * reference + 6] = False
-    part = H[np.ix_(free, free)]
-    damping = 1e-6 * max(float(np.trace(part)) / len(part), 1e-9)
+    prior = np.tile(SEARCH_INFORMATION, len(g) // 6)[free]
     twist = np.zeros(len(g))
-    twist[free] = np.linalg.solve(part + damping * np.eye(len(part)), g[free])
+    right = g[free] - prior * moved[free]
+    twist[free] = np.linalg.solve(H[np.ix_(free, free)] + np.diag(prior), right)
     return twist
 
 

@@ -22,9 +22,7 @@ from eddyscan.surface.refine import LEVER_MM
 from eddyscan.surface.sides import straightened
 from eddyscan.surface.view import View
 
-POOL_MM = (5.0, 12.0, 12.0)  # one per pass: coarse first, then over lengths that outvote a patch
-TRUST_MM = 2.0  # after the first pass the border is no farther away than this
-POINT_TO_PLANE_INFLATION = 60.0  # neighbouring pixels share their noise: this many count as one
+LOOSE_MM = 0.4  # standard uncertainty sideways above which the first look must reach far
 EDGE_NOISE_MM = 0.25
 EDGE_CORRELATION_MM = 10.0
 FACED_COSINE = 0.3  # a wall seen this squarely is used itself; the edge above it is biased outwards
@@ -39,6 +37,19 @@ class Sharpened:
     part: PartFrame
     information: Array | None
     border_share: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """One pass: how far to look, over which length to pool, how far off an offset may be believed [mm]."""
+
+    reach_mm: float
+    pool_mm: float
+    trust_mm: float
+
+
+FAR_LOOK = Look(16.0, 8.0, 1e9)
+LOOKS = (Look(4.0, 5.0, 1e9), Look(4.0, 12.0, 2.0), Look(4.0, 12.0, 2.0))
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,7 @@ def sharpen(
     information: Array | None,
     centre: Array,
     reference: int,
+    looks: tuple[Look, ...] | None = None,
 ) -> Sharpened:
     """Correct poses (unless `information` is None: given poses stay) and place the outline.
 
@@ -69,12 +81,14 @@ def sharpen(
     height : (N, 2) -> (N,) [mm, part frame], the top surface, extrapolated beyond its edge
     information : (6K, 6K) normal matrix of the point-to-plane registration about `centre` [world]
     reference : index of the view that stays
+    looks : passes; `(FAR_LOOK,)` when views may stand many millimetres off
     """
+    looks = LOOKS if looks is None else looks
     current = list(views)
     outline, seen = part.outline, 0.0
     total = information
-    for pool_mm in POOL_MM:
-        border = _measure(current, part, outline, height, pool_mm)
+    for look in looks:
+        border = _measure(current, part, outline, height, look)
         seen = float(np.isfinite(border.offset).any(axis=0).mean())
         if seen < CLEAR_SHARE:
             break
@@ -82,7 +96,7 @@ def sharpen(
             twists, shifted, total = _pose_correction(border, part, information, centre, reference)
             current = [_moved(v, twists[k], centre) for k, v in enumerate(current)]
             border = replace(border, offset=shifted)
-        outline = _placed(border)
+        outline = _placed(border, look.trust_mm)
     points = np.concatenate([v.points_in(part.T_part_world, *part.box(0.0))[0] for v in current])
     axes = align(outline, points)
     frame = PartFrame(
@@ -94,10 +108,26 @@ def sharpen(
     return Sharpened(tuple(current), frame, total, seen)
 
 
-def _measure(views: Sequence[View], part: PartFrame, outline: Outline, height: Height, pool_mm: float) -> _Border:
+def is_loose(information: Array | None, reference: int) -> bool:
+    """Say whether point-to-plane registration left a view free to slide, so that a far look must come first."""
+    return information is not None and bool(sideways_uncertainty(information, reference).max(initial=0.0) > LOOSE_MM)
+
+
+def sideways_uncertainty(information: Array, reference: int) -> Array:
+    """Return the largest standard uncertainty in x, y [mm] of every view but the reference (K-1,)."""
+    free = np.ones(len(information), dtype=bool)
+    free[6 * reference : 6 * reference + 6] = False
+    covariance = np.linalg.inv(information[np.ix_(free, free)] + 1e-6 * np.eye(int(free.sum())))
+    blocks = [covariance[6 * k + 3 : 6 * k + 5, 6 * k + 3 : 6 * k + 5] for k in range(len(covariance) // 6)]
+    return np.array([np.sqrt(max(float(np.linalg.eigvalsh(b)[-1]), 0.0)) for b in blocks])
+
+
+def _measure(views: Sequence[View], part: PartFrame, outline: Outline, height: Height, look: Look) -> _Border:
     contour = even_spacing(outline.polygon, 1.0)
     normal = outward(contour)
-    edges = measure_edges(views, part.T_part_world, contour, normal, height, pool_mm=pool_mm)
+    edges = measure_edges(
+        views, part.T_part_world, contour, normal, height, pool_mm=look.pool_mm, reach_mm=look.reach_mm
+    )
     rim = np.concatenate([contour, height(contour)[:, None]], axis=1)
     offset = edges.offset_mm.copy()
     low, high = part.box(6.0)
@@ -126,7 +156,7 @@ def _pose_correction(
     lever = apply(T_world_part, border.rim) - centre
     rows = np.concatenate([np.cross(lever, normal) / LEVER_MM, normal], axis=1)
     offset, twists = border.offset.copy(), np.zeros((views, 6))
-    H = information / POINT_TO_PLANE_INFLATION
+    H = information
     free = np.ones(6 * views, dtype=bool)
     free[6 * reference : 6 * reference + 6] = False
     total = H
@@ -185,8 +215,8 @@ def _moved(view: View, twist: Array, centre: Array) -> View:
     return replace(view, T_world_camera=small @ view.T_world_camera)
 
 
-def _placed(border: _Border) -> Outline:
-    trust = np.clip(1 - (np.nan_to_num(border.offset) / TRUST_MM) ** 2, 0.05, None)
+def _placed(border: _Border, trust_mm: float) -> Outline:
+    trust = np.clip(1 - (np.nan_to_num(border.offset) / trust_mm) ** 2, 0.05, None)
     weight = _weights(border.offset) * trust
     total = weight.sum(axis=0)
     known = total > 0

@@ -84,11 +84,24 @@ def straightened(
     starts = sorted({int(np.argmin(np.linalg.norm(loop - c, axis=1))) for c in corners})
     runs = [np.arange(a, b + 1) % len(loop) for a, b in pairwise([*starts, starts[0] + len(loop)])]
     sides = [_fitted(loop[r], known[r], spacing_mm) for r in runs]
+    kept = [
+        k
+        for k in range(len(runs))
+        if not _unmeasured_corner(runs[k], known, sides[k], sides[k - 1], sides[(k + 1) % len(sides)])
+    ]
+    runs, sides = [runs[k] for k in kept], [sides[k] for k in kept]
     smooth = gaussian_filter1d(loop, 4.0 / spacing_mm, axis=0, mode="wrap")
     pieces = [_piece(sides[k - 1], sides[k], sides[(k + 1) % len(sides)], smooth[r]) for k, r in enumerate(runs)]
     straight = [s for s in sides if s is not None and s.straight]
     directions = [float(np.degrees(np.arctan2(*s.end(False)[1][::-1]))) for s in straight]
     return _without_repeats(np.concatenate(pieces)), np.array(directions), np.array([s.length_mm for s in straight])
+
+
+def _unmeasured_corner(
+    run: NDArray[np.int64], known: NDArray[np.bool_], side: _Side | None, before: _Side | None, after: _Side | None
+) -> bool:
+    """Say whether a short run between two fitted sides is only the first look's guess: then the sides meet."""
+    return side is None and before is not None and after is not None and float(known[run].mean()) < 0.5
 
 
 def _fitted(points: Array, known: NDArray[np.bool_], spacing_mm: float) -> _Side | None:

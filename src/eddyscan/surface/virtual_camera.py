@@ -56,6 +56,11 @@ def _camera(points: Array, name: str) -> PinholeCamera:
     low, high = np.quantile(slope, 0.001, axis=0), np.quantile(slope, 0.999, axis=0)
     unique = np.unique(np.round(slope[:: max(1, len(slope) // 200_000)], 6), axis=0)
     share = len(unique) / max(len(slope[:: max(1, len(slope) // 200_000)]), 1)
+    if np.min(high - low) < 1e-3:
+        raise GeometryError(
+            f"{name}: its {len(points)} points lie in one direction from the camera: it shows no surface. "
+            "Check for repeated points and export it again."
+        )
     density = np.sqrt(share * len(slope) / np.prod(np.maximum(high - low, 1e-6)))
     f = float(np.clip(density, 50, MAX_SIDE_PX / np.max(high - low)))
     width, height = (int(np.ceil(f * (high[k] - low[k]))) + 4 for k in range(2))
