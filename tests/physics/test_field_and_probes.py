@@ -90,6 +90,14 @@ def test_the_field_folded_onto_the_slot_equals_plain_quadrature(profile):
     assert drive.across[0, 0, 0] == pytest.approx(across, rel=1e-4)
 
 
+def test_far_away_the_slot_is_not_seen_and_costs_no_more(solver):
+    near, far, farther = np.abs(solver.change_ohm(PENCIL, [1.0, 8.0, 400.0], [0.0, 5.0, 300.0], 0.1))
+    assert far < 1e-4 * near
+    assert farther < 1e-9 * near
+    alone = abs(solver.change_ohm(PENCIL, 8.0, 5.0, 0.1)[0])
+    assert far == pytest.approx(alone, rel=1e-3)
+
+
 def test_reciprocity_of_two_different_coils(solver):
     pair = CoilPair(PENCIL, OTHER, 2.6, 35.0)
     turned = CoilPair(OTHER, PENCIL, 2.6, 215.0)

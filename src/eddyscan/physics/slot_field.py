@@ -66,21 +66,21 @@ class CoilOnSlot:
         amplitude = -metal.j_omega_mu * coil.turn_density * w * source(coil, k)
         scale = amplitude * np.exp(-np.outer(lift_off_m, k))
         self._heights = len(lift_off_m)
-        count = 8 + int(reach_m * RADII_PER_MEAN_RADIUS / coil.mean_radius_m)
-        radii = np.linspace(0.0, reach_m * (1 + 1e-9), count)
-        bessel = j1(np.outer(radii, k))
-        bessel[1:] /= radii[1:, None]
-        bessel[0] = 0.5 * k
-        self._across = self._spline(radii, bessel, scale, basis.depth_columns(profile))
+        radii = _radii(coil, reach_m)
+        self._across = self._spline(radii, k, scale, basis.depth_columns(profile))
         self._along: BSpline | None = None
         if metal.opening_m > 0:
             columns = np.sqrt(metal.sigma * metal.opening_m) * basis.line_columns(profile)
-            self._along = self._spline(radii, bessel, scale, columns)
+            self._along = self._spline(radii, k, scale, columns)
 
-    def _spline(self, radii: Array, bessel: Array, scale: ComplexArray, columns: ComplexArray) -> BSpline:
-        right = np.einsum("hk,kc->khc", scale, columns).reshape(scale.shape[1], -1)
-        values = bessel @ right.real + 1j * (bessel @ right.imag)
-        return make_interp_spline(radii, values, k=3)
+    def _spline(self, radii: Array, k: Array, scale: ComplexArray, columns: ComplexArray) -> BSpline:
+        right = np.einsum("hk,kc->khc", scale, columns).reshape(len(k), -1).view(np.float64)
+        values = np.empty((len(radii), right.shape[1]))
+        step = max(1, VALUES_PER_CHUNK * 4 // len(k))
+        for start in range(0, len(radii), step):
+            r = np.maximum(radii[start : start + step, None], 1e-9 * radii[1])
+            values[start : start + step] = (j1(r * k) / r) @ right
+        return make_interp_spline(radii, values.view(np.complex128), k=3)
 
     def drives(self, x_m: Array, y_m: Array) -> Iterator[tuple[slice, Drive]]:
         """Yield (which positions, their Drive) in chunks for coil axes at x, y (N,), (N,) [m, slot frame]."""
@@ -104,3 +104,14 @@ class CoilOnSlot:
         if self._along is None or not dy.any():
             return np.zeros((len(r), self._heights, 0), dtype=np.complex128)
         return self._basis.line_fold(self._sampled(self._along, r) * dy[..., None, None])
+
+
+def _radii(coil: Coil, reach_m: float) -> Array:
+    """Return radii [m] from 0 to the reach: even spacing to four outer radii, growing by 2 % beyond."""
+    spacing = coil.mean_radius_m / RADII_PER_MEAN_RADIUS
+    near = min(reach_m, 4 * coil.outer_m) * (1 + 1e-9)
+    even = np.linspace(0.0, near, 8 + int(near / spacing))
+    if reach_m <= near:
+        return even
+    far = near * np.geomspace(1.0, reach_m / near * (1 + 1e-9), 3 + int(np.log(reach_m / near) / np.log(1.02)))
+    return np.concatenate([even, far[1:]])
