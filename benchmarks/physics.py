@@ -91,7 +91,7 @@ def plate_lines() -> list[Line]:
     lines = [Line("coil over the sound plate", "178.66 mH, 120.65 ohm", f"{1e3 * henry:.3f} mH, {ohm:.3f} ohm", good)]
     for name, experiment in (("1", PROBLEM_1), ("2", PROBLEM_2)):
         model = air_inductance_h(experiment.coil)
-        text = f"{1e3 * model:.4g} mH, measured {1e3 * experiment.measured_air_h:.4g} mH"
+        text = f"{1e3 * model:.5g} mH, measured {1e3 * experiment.measured_air_h:.4g} mH"
         lines.append(Line(f"TEAM 15-{name} coil in air", "-", text, True))
     return lines
 
@@ -246,7 +246,7 @@ def main() -> None:
         print(f"{'ok ' if line.good else 'NOT'} {line.check:{width}}  {line.bar:22} {line.measured}")
     rows = "\n".join(f"| {line.check} | {line.bar} | {line.measured} |" for line in lines)
     write_figures()
-    body = f"""`python -m benchmarks.physics` (seed {SEED}; times are the best of three runs, 2 cores)
+    body = f"""`python -m benchmarks.physics` (seed {SEED}; wall and CPU times are the best of three runs)
 
 | check | bar | measured |
 |---|---|---|
@@ -260,7 +260,7 @@ TEAM 15 problem 2, the same model and slot with the second coil at 7 kHz:
 
 {problem_2_rows()}
 
-A slot's signal over coil positions, lift-off 0.1 mm: two lobes along the slot, weak beside it.
+A slot's signal over coil positions at 0.1 mm lift-off: strongest along the slot, two lobes when shorter than the coil.
 
 ![Slot signal over positions](pictures/physics-slot-map.png)
 
