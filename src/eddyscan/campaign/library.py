@@ -76,9 +76,11 @@ def build_library(
 
 
 def _nodes(low: float, high: float, ratio: float) -> Array:
-    """Return at least four nodes that hold [low, high] and are at most `ratio` apart."""
+    """Return one node for one value, else at least four that hold [low, high] and are at most `ratio` apart."""
+    if high <= low * 1.0001:
+        return np.array([low])
     count = max(4, int(np.ceil(np.log(high / low) / np.log(ratio))) + 1)
-    return np.geomspace(low, high, count) if high > low * 1.0001 else low * ratio ** np.arange(-1.0, 3.0)
+    return np.geomspace(low, high, count)
 
 
 def _shared_grid(coil: Coil, longest_mm: float, highest_mm: float) -> TableGrid:
@@ -91,6 +93,8 @@ def _shared_grid(coil: Coil, longest_mm: float, highest_mm: float) -> TableGrid:
 
 
 def _between(nodes: Array, values: NDArray[np.complex128], at: float) -> NDArray[np.complex128]:
-    """Interpolate the first axis by a cubic through all nodes."""
+    """Interpolate the first axis by a cubic through all nodes; one node is the value itself."""
+    if len(nodes) == 1:
+        return values[0]
     weights = make_interp_spline(nodes, np.eye(len(nodes)), k=3)(at)
     return np.asarray(np.tensordot(np.asarray(weights), values, axes=1))

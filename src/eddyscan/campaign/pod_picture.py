@@ -22,7 +22,7 @@ def draw_pod(size_mm: Array, found: BoolArray, curves: Sequence[PodCurve], out: 
     axis.plot(size_mm, found.astype(float), "|", color="#64748b", markersize=7, alpha=0.5, label="found or missed")
     sizes = np.geomspace(size_mm.min(), size_mm.max(), 300)
     for curve, colour in zip(curves, COLOURS, strict=False):
-        label = f"{curve.kind}: a90 {curve.a90_mm:.2f}, a90/95 {curve.a90_95_mm:.2f} mm"
+        label = f"{curve.method}: a90 {curve.a90_mm:.2f}, a90/95 {curve.a90_95_mm:.2f} mm"
         axis.plot(sizes, curve.at(sizes), color=colour, label=label)
         axis.axvline(curve.a90_95_mm, color=colour, lw=0.8, ls=":")
     axis.axhline(0.9, color="#94a3b8", lw=0.8)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from eddyscan.analysis.pod import PodCurve, hit_miss, signal_response
+from eddyscan.analysis.pod import PodCurve, pod_from_hits, pod_from_signals
 from eddyscan.core.errors import InputError
 from eddyscan.core.frames import Array
 
@@ -54,12 +54,12 @@ def _detection(rows: Sequence[Mapping[str, Any]], out: Path) -> dict[str, Any]:
 
 def _curves(rows: Sequence[Mapping[str, Any]], found: Any, figures: dict[str, Any]) -> list[PodCurve]:
     sizes, score = _column(rows, "flaw_length_mm"), _column(rows, "score")
-    threshold = _threshold(rows)
+    threshold = float(rows[0]["threshold"])
     curves: list[PodCurve] = []
     notes: list[str] = []
     fits: dict[str, Callable[[], PodCurve]] = {
-        "hit_miss": lambda: hit_miss(sizes, found),
-        "signal": lambda: signal_response(sizes[score > 0], score[score > 0], threshold=threshold),
+        "hit_miss": lambda: pod_from_hits(sizes, found, basis=LABEL),
+        "signal": lambda: pod_from_signals(sizes, score, threshold=threshold, basis=LABEL),
     }
     for name, fit in fits.items():
         try:
@@ -68,16 +68,16 @@ def _curves(rows: Sequence[Mapping[str, Any]], found: Any, figures: dict[str, An
             notes.append(f"{name}: {error}")
             continue
         curves.append(curve)
-        figures[f"pod_{name}"] = {"a90_mm": curve.a90_mm, "a90_95_mm": curve.a90_95_mm, "n": curve.n}
+        figures[f"pod_{name}"] = {
+            "a50_mm": curve.a50_mm,
+            "a90_mm": curve.a90_mm,
+            "a90_95_mm": curve.a90_95_mm,
+            "method": curve.method,
+            "basis": curve.basis,
+        }
     if notes:
         figures["pod_notes"] = notes
     return curves
-
-
-def _threshold(rows: Sequence[Mapping[str, Any]]) -> float:
-    """Return the call level as the smallest score that was called."""
-    called = [float(row["score"]) for row in rows if row["found"]]
-    return min(called, default=1.0)
 
 
 def sensitivity(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

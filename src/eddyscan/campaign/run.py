@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from eddyscan.campaign.design import Column, case_seeds, draw_cases
+from eddyscan.campaign.design import case_seeds, draw_cases
 from eddyscan.campaign.engine import CaseFunction, run_batches
 from eddyscan.campaign.full_case import full_cases, full_names, run_full_cases
 from eddyscan.campaign.library import build_library
@@ -46,16 +46,17 @@ def run_campaign(
     campaign = read_toml(file, Campaign)
     cases = _cases(campaign)
     store = RowStore(out, {"campaign_sha256": sha256_of_value(campaign), "name": campaign.campaign.name})
-    done = store.done()
-    missing = [case for case in cases if case["case"] not in done]
-    progress("cases", len(done), len(cases))
-    if missing:
-        function, shared = _work(campaign, cases, out, progress)
-        count = len(done)
-        for rows in run_batches(function, shared, missing, workers=workers, scheduler=scheduler, say=say):
-            store.add(rows)
-            count += len(rows)
-            progress("cases", count, len(cases))
+    with store.owned():
+        done = store.done()
+        missing = [case for case in cases if case["case"] not in done]
+        progress("cases", len(done), len(cases))
+        if missing:
+            function, shared = _work(campaign, cases, out, progress)
+            count = len(done)
+            for rows in run_batches(function, shared, missing, workers=workers, scheduler=scheduler, say=say):
+                store.add(rows)
+                count += len(rows)
+                progress("cases", count, len(cases))
     return store.rows()
 
 
@@ -102,10 +103,3 @@ def _libraries(
 def _limits(cases: list[dict[str, Any]], name: str) -> tuple[float, float]:
     values = [case[name] for case in cases]
     return min(values), max(values)
-
-
-def columns_of(rows: list[dict[str, Any]]) -> Mapping[str, Column]:
-    """Return the rows as arrays by name."""
-    import numpy as np
-
-    return {name: np.array([row.get(name) for row in rows]) for name in rows[0]} if rows else {}

@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from eddyscan.physics import Coil, Conductor, air_inductance_h, impedance_ohm, t
 NEAR_MM = 2.0
 RIM_MM = 8.0
 KNOTS = 61
+MESH_MM = 1.0
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,8 @@ def run_signal_cases(shared: SignalShared, cases: Sequence[Mapping[str, Any]]) -
 def run_signal_case(shared: SignalShared, case: Mapping[str, Any]) -> dict[str, Any]:
     """Return the case's values with what the analysis found: a pure function of values and seed.
 
-    Row keys beside the case's own: found, score, amplitude_ohm, amplitude_share,
-    position_error_mm, length_mm, depth_mm, false_calls, readings, seconds.
+    Row keys beside the case's own: found, score and the threshold it is called at,
+    amplitude_ohm, position_error_mm, length_mm, depth_mm, false_calls, readings, seconds.
     """
     began = time.perf_counter()
     draw = np.random.default_rng(case["seed"])
@@ -65,8 +67,22 @@ def run_signal_case(shared: SignalShared, case: Mapping[str, Any]) -> dict[str, 
 def _technique_of(technique: Technique, case: Mapping[str, Any]) -> Technique:
     drive = technique.drive.model_copy(update={"frequency_hz": case["frequency_hz"]})
     scan = technique.scan.model_copy(update={"lift_off_mm": case["lift_off_mm"]})
-    plan = technique.plan.model_copy(update={"pitch_mm": case["pitch_mm"], "step_mm": case["step_mm"]})
+    # The probe of a flat raster stands on the normal: there is no tilt to find, which halves the analysis.
+    plan = technique.plan.model_copy(
+        update={"pitch_mm": case["pitch_mm"], "step_mm": case["step_mm"], "machine": "pose"}
+    )
     return technique.model_copy(update={"drive": drive, "scan": scan, "plan": plan})
+
+
+@lru_cache(maxsize=8)
+def _flat_mesh(side_mm: float) -> SurfaceMesh:
+    count = max(2, round(side_mm / MESH_MM) + 1)
+    ticks = np.linspace(0.0, side_mm, count)
+    y, x = (grid.ravel() for grid in np.meshgrid(ticks, ticks, indexing="ij"))
+    index = np.arange(x.size).reshape(count, count)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return SurfaceMesh.from_triangles(np.stack([x, y, np.zeros_like(x)], axis=1), faces)
 
 
 class _Raster:
@@ -93,11 +109,8 @@ class _Raster:
         return np.asarray(smooth / smooth.std() * self.case["lift_off_sd_mm"]).ravel()
 
     def mesh(self) -> SurfaceMesh:
-        """Return the field's flat surface with a vertex below every reading."""
-        index = np.arange(self.x.size).reshape(self.shape)
-        a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-        faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-        return SurfaceMesh.from_triangles(np.stack([self.x, self.y, np.zeros_like(self.x)], axis=1), faces)
+        """Return the field's flat surface, meshed as finely as a flat one needs."""
+        return _flat_mesh(float(self.case["field_mm"]))
 
     def record(self, shared: SignalShared, technique: Technique) -> ScanRecord:
         """Return what the instrument reads over the field."""
@@ -148,6 +161,7 @@ class _Raster:
             "flaw_angle_deg": self.angle_deg,
             "found": ours is not None,
             "score": score,
+            "threshold": technique.analysis.threshold_mad,
             "amplitude_ohm": float(size),
             "position_error_mm": None if ours is None else float(ours[0]),
             "length_mm": None if ours is None else ours[1].length_mm,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,31 @@ class RowStore:
             return
         part = self.folder / f"rows-{min(int(row['case']) for row in rows):08d}-{uuid.uuid4().hex[:8]}.parquet"
         temporary = part.with_suffix(".tmp")
-        pq.write_table(pa.Table.from_pylist([dict(row) for row in rows]), temporary)
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
+        table = pa.Table.from_pylist([dict(row) for row in rows])
+        for number, field in enumerate(table.schema):  # a figure no row of this part has is still a number
+            if pa.types.is_null(field.type):
+                table = table.set_column(number, field.name, table.column(number).cast(pa.float64()))
+        pq.write_table(table, temporary)
+        _to_disk(temporary)
         temporary.replace(part)
+        _to_disk(self.folder)
+
+    @contextmanager
+    def owned(self) -> Iterator[None]:
+        """Hold the folder against a second campaign; the hold ends with the process, however that ends."""
+        try:
+            import fcntl
+        except ImportError:  # a system without file locks
+            yield
+            return
+        with (self.folder / "lock").open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise FileError(
+                    f"another campaign is writing to {self.folder} at this moment. Wait for it, or name another --out."
+                ) from None
+            yield
 
     def done(self) -> set[int]:
         """Return the case numbers that have a row."""
@@ -60,3 +82,14 @@ class RowStore:
 
     def _parts(self) -> list[Path]:
         return sorted(self.folder.glob("rows-*.parquet"))
+
+
+def _to_disk(path: Path) -> None:
+    """Make a file's content, or a folder's names, survive a power cut."""
+    if path.is_dir() and os.name == "nt":
+        return
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

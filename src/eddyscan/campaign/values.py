@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from eddyscan.campaign.design import Column
 from eddyscan.core.errors import TechniqueError
@@ -17,6 +17,8 @@ PREFIX = "flaw."
 
 class SignalValues(Section):
     """One virtual field inspection: a flaw in a flat field, read and analysed."""
+
+    model_config = ConfigDict(validate_default=True)
 
     flaw_length_mm: float = Field(1.0, gt=0.05, le=20)
     flaw_depth_mm: float = Field(0.33, gt=0.02, le=10)
@@ -30,7 +32,17 @@ class SignalValues(Section):
     step_mm: float = Field(0.5, gt=0.05, le=5)
     frequency_hz: float = Field(500e3, gt=0, le=20e6)
     coil_tolerance: float = Field(0.02, ge=0, le=0.1, description="largest relative error of each coil size")
-    field_mm: float = Field(40.0, ge=10, le=200)
+    field_mm: float = Field(40.0, ge=20, le=200, description="side; the flaw's centre keeps 8 mm from the rim")
+
+    @field_validator("flaw_opening_mm")
+    @classmethod
+    def _thin(cls, opening_mm: float, info: ValidationInfo) -> float:
+        sizes = [info.data[name] for name in ("flaw_length_mm", "flaw_depth_mm") if name in info.data]
+        if sizes and opening_mm > 0.5 * min(sizes):
+            raise ValueError(
+                f"wider than half the smaller of the flaw's length and depth ({0.5 * min(sizes):.3g} mm), no thin slot"
+            )
+        return opening_mm
 
 
 def signal_names() -> set[str]:
