@@ -118,3 +118,41 @@ def test_a_wrong_air_reading_is_refused(mesh, air, fault):
     record, _ = sound_scan.grid_record(FINE)
     with pytest.raises(InputError, match=f"air reading.*{fault}"):
         analyse(dataclasses.replace(record, meta={**record.meta, "air": air}), mesh, FINE)
+
+
+def test_a_record_without_an_air_reading_finds_the_wire_itself(mesh):
+    record, true = sound_scan.grid_record(FINE, lift_off_error=ripple)
+    bare = dataclasses.replace(record, meta={"T_stage_part": record.meta["T_stage_part"]})
+    result = analyse(bare, mesh, FINE)
+    assert np.abs(result.lift_off_mm - true).max() < 0.015
+    assert result.statistics["air_reading"] == "estimated from the scan"
+
+
+def test_sensitivity_falls_with_lift_off(mesh):
+    record, _ = sound_scan.grid_record(FINE, lift_off_error=lambda u, v: np.where(u > 80, 0.8, 0.0))
+    cscan = analyse(record, mesh, FINE).cscan
+    near = cscan.covered & (mesh.vertices[:, 0] < 75)
+    far = cscan.covered & (mesh.vertices[:, 0] > 85)
+    assert np.abs(cscan.channels["sensitivity"][near] - 1).max() < 0.05
+    # 3 x 1 mm crack: 1.02 %X0 at 0.2 mm, 0.115 at 1.0 mm; a small crack loses somewhat more
+    assert 0.05 < np.median(cscan.channels["sensitivity"][far]) < 0.13
+
+
+def test_a_small_crack_is_called_once_and_in_its_place(mesh):
+    from eddyscan import physics
+
+    record, true = sound_scan.grid_record(FINE, window=(40.0, 90.0, 30.0, 60.0))
+    grid = physics.table_grid(physics.Slot(1.0, 0.3, 0.1), sound_scan.true_coil(FINE), counts=(23, 21, 5))
+    table = physics.build_table(
+        physics.Slot(1.0, 0.3, 0.1), sound_scan.true_coil(FINE), physics.Conductor.half_space(19.0), 500e3, grid=grid
+    )
+    foot, normal, _ = named_part("block-a").closest(np.array([[66.0, 44.0, 60.0]]))
+    below, _, _ = named_part("block-a").closest(record.part_mm)
+    along = np.cross([0.0, 1.0, 0.0], normal[0])
+    offset = below - foot[0]
+    signal = table.change_ohm(offset @ along, offset[:, 1], true, beyond_is_zero=True)
+    found = analyse(dataclasses.replace(record, impedance_ohm=record.impedance_ohm + signal), mesh, FINE).indications
+    assert len(found) == 1
+    assert np.linalg.norm(np.array(found[0].centre_mm) - foot[0]) < 0.5
+    assert found[0].snr > 12
+    assert found[0].angle_deg < 20 or found[0].angle_deg > 160

@@ -33,6 +33,7 @@ def explained(channel: Array, causes: Array, *, rounds: int = 4) -> Array:
         crack does not bend the fit.
     """
     finite = np.isfinite(channel) & np.isfinite(causes).all(axis=1)
+    causes = _without_leverage(causes, finite)
     spread = causes[finite].std(axis=0)
     used = spread > 1e-12
     design = np.column_stack(
@@ -46,6 +47,13 @@ def explained(channel: Array, causes: Array, *, rounds: int = 4) -> Array:
         if keep.sum() < 2 * design.shape[1]:
             break
     return np.asarray(design @ fit)
+
+
+def _without_leverage(causes: Array, finite: BoolArray) -> Array:
+    """Return causes cut at 3 robust deviations: a crack fakes lift-off, and must not explain itself by it."""
+    middle = np.median(causes[finite], axis=0)
+    reach = 3.0 * MAD_TO_SIGMA * np.median(np.abs(causes[finite] - middle), axis=0)
+    return np.asarray(np.clip(causes, middle - reach, middle + reach))
 
 
 def slow_along_rows(channel: Array, row: IntArray, position_mm: Array, *, window_mm: float) -> Array:
@@ -116,7 +124,8 @@ def _local_planes(place: Array, value: Array, near: IntArray, inside: BoolArray)
     left = data - middle
     for _ in range(PLANE_ROUNDS):
         scale = MAD_TO_SIGMA * np.nanmedian(np.where(inside, np.abs(left), np.nan), axis=1, keepdims=True)
-        keep = inside * np.clip(1.0 - (left / (3.0 * np.maximum(scale, 1e-300))) ** 2, 0.0, 1.0) ** 2
+        floor = np.maximum(scale, 1e-9 * (np.abs(middle) + np.abs(data).max() + 1e-30))
+        keep = inside * np.clip(1.0 - (left / (3.0 * floor)) ** 2, 0.0, 1.0) ** 2
         weighted = basis * keep[..., None]
         normal = np.swapaxes(weighted, 1, 2) @ basis + ridge
         fit = np.linalg.solve(normal, np.swapaxes(weighted, 1, 2) @ data[..., None])

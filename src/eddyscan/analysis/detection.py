@@ -68,8 +68,8 @@ def match_cracks(
     return Match(score, angle)
 
 
-def field_profile(response: SoundResponse, lift_off_mm: float, distance_mm: Array) -> Array:
-    """Return the squared electric field at the surface at distances (K,) [mm] from the coil's axis, largest 1.
+def field_power(response: SoundResponse, lift_off_mm: float, distance_mm: Array) -> Array:
+    """Return the squared electric field at the surface at distances (K,) [mm] from the coil's axis (any unit).
 
     Dodd and Deeds: E = integral of M(k) exp(-k h) k / (k + lambda) J1(k r) dk.
     """
@@ -78,13 +78,13 @@ def field_profile(response: SoundResponse, lift_off_mm: float, distance_mm: Arra
     real = weight * source(response.coil, k) * np.exp(-k * lift_off_mm * 1e-3)
     spectrum = real * k / (k + layer_lambda(layer, k, response.frequency_hz))
     field = j1(np.outer(distance_mm * 1e-3, k)) @ spectrum
-    power = np.abs(field) ** 2
-    return np.asarray(power / power.max())
+    return np.asarray(np.abs(field) ** 2)
 
 
 def _profile(response: SoundResponse, lift_off_mm: float, reach_mm: float, distance_mm: Array) -> Array:
     knots = np.linspace(0.0, reach_mm, PROFILE_POINTS)
-    return np.asarray(np.interp(distance_mm, knots, field_profile(response, lift_off_mm, knots)))
+    power = field_power(response, lift_off_mm, knots)
+    return np.asarray(np.interp(distance_mm, knots, power / power.max()))
 
 
 def _neighbours(foot_mm: Array, normal: Array, reach_mm: float) -> tuple[IntArray, IntArray, Array, ComplexArray]:

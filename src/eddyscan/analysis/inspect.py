@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from eddyscan.analysis.indications import Signals, find_indications
 from eddyscan.analysis.mapping import map_to_surface
 from eddyscan.analysis.readings import Readings, usable
 from eddyscan.analysis.result import AnalysisResult
+from eddyscan.analysis.sensitivity import SENSITIVE, relative_sensitivity
 from eddyscan.core.footing import Footing, footing
 from eddyscan.core.frames import Array, BoolArray
 from eddyscan.core.mesh import SurfaceMesh
@@ -40,6 +42,8 @@ from eddyscan.physics.sound_response import (
 SLOW_WINDOW_IN_DIAMETERS = 8.0
 LEAST_FOR_SURFACE = 50
 EXTRAPOLATED_MM = 8.0
+WIRE_SAMPLES = 2000
+WIRE_ROUNDS = 5
 
 
 def analyse(
@@ -60,7 +64,8 @@ def analyse(
     AnalysisResult
         Channels of its C-scan: "lift_off_mm" (coil to surface), "amplitude_ohm" (change
         against air), "residual_ohm" (size of what sound metal does not explain),
-        "score" (matched residual over its noise).
+        "score" (matched residual over its noise), "sensitivity" (response to a small
+        crack at this lift-off over that at the technique's).
 
     Raises
     ------
@@ -73,7 +78,7 @@ def analyse(
     readings = usable(record, technique.drive.frequency_hz)
     below = footing(mesh, readings.part_mm, axis=probe_axis(readings, technique))
     progress("lift-off", 1, 4)
-    response = response_for(technique, readings, largest_tilt_deg=float(below.tilt_deg.max()))
+    response = response_for(technique, readings, tilt_deg=below.tilt_deg)
     below, projection, lift_off = read_lift_off(readings, below, response, mesh, technique)
     progress("residual", 2, 4)
     across = crack_channel(readings, below, projection, technique)
@@ -83,8 +88,16 @@ def analyse(
         signals, threshold=technique.analysis.threshold_mad, merge_mm=2 * technique.probe.outer_radius_mm
     )
     amplitude = np.abs(readings.impedance_ohm - response.air_ohm)
-    cscan = _cscan(mesh, below, {"lift_off_mm": lift_off, "amplitude_ohm": amplitude}, signals, technique)
+    sensitivity = relative_sensitivity(response, lift_off, nominal_mm=technique.scan.lift_off_mm)
+    channels = {"lift_off_mm": lift_off, "amplitude_ohm": amplitude, "sensitivity": sensitivity}
+    cscan = _cscan(mesh, below, channels, signals, technique)
     statistics = _statistics(record, readings, lift_off, signals, cscan.covered, response)
+    statistics |= {
+        "sensitive_share": float((cscan.covered & (cscan.channels["sensitivity"] >= SENSITIVE)).mean()),
+        "false_call_basis": f"matched residual above {technique.analysis.threshold_mad:g} robust standard deviations",
+        "air_reading": "estimated from the scan" if readings.air_ohm is None else "measured",
+        "coil": "calibrated" if readings.coil is not None else "by its air reading" if readings.air_ohm else "as drawn",
+    }
     progress("indications", 4, 4)
     n = len(record)
     return AnalysisResult(
@@ -103,9 +116,9 @@ def probe_axis(readings: Readings, technique: Technique) -> Array | None:
     return readings.axis if technique.plan.machine == "xyz" else None
 
 
-def response_for(technique: Technique, readings: Readings, *, largest_tilt_deg: float) -> SoundResponse:
+def response_for(technique: Technique, readings: Readings, *, tilt_deg: Array) -> SoundResponse:
     """Return the sound part's curve: the coil as calibrated, else by its air reading, else as drawn."""
-    coil, air = technique_coil(technique), readings.air_ohm
+    coil, air, largest_tilt_deg = technique_coil(technique), readings.air_ohm, float(tilt_deg.max())
     if readings.coil is not None:
         coil = readings.coil
     elif air is not None:
@@ -113,14 +126,37 @@ def response_for(technique: Technique, readings: Readings, *, largest_tilt_deg: 
     conductor = technique_conductor(technique)
     if readings.conductivity_ms_m is not None:
         conductor = Conductor.half_space(readings.conductivity_ms_m)
-    return sound_response(
-        coil,
-        conductor,
-        technique.drive.frequency_hz,
-        air_ohm=air,
-        largest_lift_off_mm=2.0 * technique.analysis.lift_off_max_mm + 1.0,
-        largest_tilt_deg=largest_tilt_deg,
-    )
+
+    def curve(air_ohm: complex | None) -> SoundResponse:
+        return sound_response(
+            coil,
+            conductor,
+            technique.drive.frequency_hz,
+            air_ohm=air_ohm,
+            largest_lift_off_mm=2.0 * technique.analysis.lift_off_max_mm + 1.0,
+            largest_tilt_deg=largest_tilt_deg,
+        )
+
+    return curve(air) if air is not None else _with_wire(curve, readings, tilt_deg)
+
+
+def _with_wire(curve: Callable[[complex | None], SoundResponse], readings: Readings, tilt_deg: Array) -> SoundResponse:
+    """Return the curve with the wire's resistance that lays most readings on it, for records without an air reading."""
+    some = slice(None, None, max(1, len(readings) // WIRE_SAMPLES))
+    reactance = curve(None).reactance_air_ohm
+
+    def beside(wire_ohm: float) -> float:
+        projection = curve(complex(wire_ohm, reactance)).project(readings.impedance_ohm[some], tilt_deg[some])
+        return float(np.nanmedian(projection.across_ohm))
+
+    low, high = 0.0, 0.05 * reactance
+    left, right = beside(low), beside(high)
+    for _ in range(WIRE_ROUNDS):
+        if abs(right - left) < 1e-12:
+            break
+        low, high, left = high, high - right * (high - low) / (right - left), right
+        right = beside(high)
+    return curve(complex(high, reactance))
 
 
 def read_lift_off(
