@@ -2,6 +2,11 @@
 
 Time convention exp(+j omega t); impedances in raw ohms, unrotated, without the
 wire's dc resistance. Lengths in mm and conductivities in MS/m at the boundary.
+
+Not modelled: edges of the part (keep 1.7 outer coil radii away), surfaces bent
+tighter than ten coil radii (`too_curved`), openings over a quarter of the skin
+depth (`slot_warnings`), ferrite cores, pits, slots that interact, slots in magnetic
+metal. `docs/decisions/physics-limits.md` lists what happens at each limit.
 """
 
 from eddyscan.physics.coil import Coil, air_inductance_h

@@ -24,7 +24,7 @@ from eddyscan.physics.conductor import Conductor
 from eddyscan.physics.slot import Slot
 from eddyscan.physics.slot_solver import SlotSolver
 
-MODEL = "thin slot 1"  # part of every key: a change of the physics makes old tables stale
+MODEL = "thin slot 2"  # part of every key: a change of the physics makes old tables stale
 
 
 @dataclass(frozen=True)
