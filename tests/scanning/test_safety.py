@@ -42,6 +42,12 @@ def test_a_plan_above_its_surface_passes():
     check(wavy_plan(), AXES, T_STAGE_PART, technique())
 
 
+def test_a_corrected_plan_passes_though_it_lies_below_the_first_estimate_of_the_surface():
+    plan = wavy_plan()
+    plan.T_part_probe[:, 2, 3] -= 0.8
+    check(plan, AXES, T_STAGE_PART, technique())
+
+
 def test_a_link_through_the_part_is_refused():
     plan = wavy_plan()
     links = np.flatnonzero(~plan.is_scan)[1:]

@@ -34,7 +34,7 @@ def check(
     stage_axes : axes x, y, z as the stage reported them [mm]
     T_stage_part : (4, 4) pose of the part on the stage
     technique : Technique
-    mesh : the surface [part]; without it the spots below the plan's points stand for it
+    mesh : the surface [part]; without it the plan's coil faces less their lift-off stand for it
     keep_out : boxes around clamps and stops [mm, stage]
     head : the tilt head, when the stage's fourth axis is one
 

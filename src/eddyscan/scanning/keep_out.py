@@ -45,7 +45,7 @@ def refuse_keep_out(
     targets : (N, 3) axis readings of the plan's poses [mm, stage]
     probe : its body is taken as an upright cylinder above the coil face
     boxes : clamps, stops and the like [mm, stage]
-    mesh : the surface [part]; without it the spots below the plan's own points stand for it
+    mesh : the surface [part]; without it the plan's coil faces less their lift-off stand for it
 
     Raises
     ------
@@ -97,7 +97,11 @@ def _along_the_way(targets: Array) -> tuple[Array, IntArray]:
 
 def _surface_height(plan: ScanPlan, T_stage_part: Array, mesh: SurfaceMesh | None) -> Callable[[Array], Array]:
     """Return a function from places (M, 2) to heights of the surface [mm, stage]; NaN where it is not known."""
-    spots = plan.surface_mm[plan.is_scan] if mesh is None else mesh.vertices[mesh.normals[:, 2] > UPWARD]
+    if mesh is None:  # where the plan expects the surface: a corrected plan knows better than its first estimate
+        probe = plan.T_part_probe[plan.is_scan]
+        spots = probe[:, :3, 3] + plan.lift_off_mm[plan.is_scan, None] * probe[:, :3, 2]
+    else:
+        spots = mesh.vertices[mesh.normals[:, 2] > UPWARD]
     spots = apply(T_stage_part, spots)
     centre = spots[:, :2].mean(axis=0)
     _, extent, directions = np.linalg.svd(spots[:, :2] - centre, full_matrices=False)
