@@ -138,6 +138,8 @@ def signal(
     with progress_bars() as progress:
         result = pipeline.signal(case, sweep=sweep, plot=plot, progress=progress)
     table(f"{case}", *pipeline.signal_table(result))
+    for warning in result.get("warnings", []):
+        say(f"warning: {warning}")
     if plot:
         say(f"picture: {plot}")
     if json:
