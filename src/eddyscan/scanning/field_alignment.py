@@ -46,6 +46,7 @@ FARTHEST_MM = 6.0
 NO_METAL_MM = 30.0  # the coil feels nothing of metal this far away
 WEAK_MM = 0.5
 WEAK_DEG = 0.5
+IN_PLANE = [2, 3, 4, 6]
 
 
 @dataclass(frozen=True)
@@ -303,13 +304,16 @@ def _visit(probe: FieldProbe, solver: PoseSolver, pose: Pose, evidence: Evidence
 def _rim_spots(solver: PoseSolver, probe: FieldProbe, pose: Pose, count: int) -> list[int]:
     """Choose rim points whose crossings pin the in-plane pose, away from corners and inside the travel."""
     rim = solver.rim
-    pool = np.arange(0, len(rim.points_mm), max(1, len(rim.points_mm) // CANDIDATES))
+    # A stride through the rim's points can miss a whole side: they are ordered by the mesh's numbering.
+    pool = np.random.default_rng(0).permutation(len(rim.points_mm))[: 2 * CANDIDATES]
     outside = apply(pose.T_stage_part, rim.points_mm[pool] - BEYOND_RIM_MM * rim.inward[pool])
     straight = np.array([_straight(solver, int(k)) for k in pool])
     upright = rim.normal[pool, 2] > np.cos(np.radians(LARGEST_TILT_DEG - 2.0))
     pool = pool[straight & upright & np.all((outside >= probe.lower) & (outside <= probe.upper), axis=1)]
-    rows = solver.crossing_row(rim.points_mm[pool], rim.inward[pool]) / 0.1
-    return [int(pool[k]) for k in _most_telling(rows, np.asarray(np.linalg.inv(pose.covariance)), count)]
+    # Yaw, x, y and the offset alone: with all eight, what contacts pinned to a micrometre drowns in rounding.
+    rows = (solver.crossing_row(rim.points_mm[pool], rim.inward[pool]) / 0.1)[:, IN_PLANE]
+    known = np.linalg.inv(pose.covariance[np.ix_(IN_PLANE, IN_PLANE)])
+    return [int(pool[k]) for k in _most_telling(rows, np.asarray(known), count)]
 
 
 def _straight(solver: PoseSolver, number: int) -> bool:
