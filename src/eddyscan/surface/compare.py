@@ -14,6 +14,7 @@ from eddyscan.core.frames import Array, apply, from_rotation_vector
 from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.parts import NominalPart
 from eddyscan.core.progress import Progress, silent
+from eddyscan.surface.open3d_adapter import closest_on_mesh
 
 COVER_MM = 1.5  # a nominal spot is covered when the mesh comes this near, sideways
 FIT_ROUNDS = 25
@@ -87,19 +88,14 @@ def _nominal(nominal: NominalPart | SurfaceMesh) -> tuple[Closest, Array]:
 
 
 class _MeshClosest:
-    """Closest points of a mesh: nearest vertex, then exact on the triangles round it."""
+    """Closest points of a triangle mesh."""
 
     def __init__(self, mesh: SurfaceMesh) -> None:
-        import trimesh
-
-        self._mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-        self._normals = mesh.normals
-        self._query = trimesh.proximity.closest_point
+        self._find = closest_on_mesh(mesh.vertices, mesh.faces)
 
     def __call__(self, points: Array) -> tuple[Array, Array, Array]:
-        foot, _, triangle = self._query(self._mesh, points)
-        normal = np.asarray(self._mesh.face_normals[triangle])
-        return np.asarray(foot), normal, np.asarray(((points - foot) * normal).sum(axis=1))
+        foot, normal = self._find(points)
+        return foot, normal, np.asarray(((points - foot) * normal).sum(axis=1))
 
 
 def _on_surface(points: Array, foot: Array, distance: Array) -> NDArray[np.bool_]:

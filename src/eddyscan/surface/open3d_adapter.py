@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -59,3 +60,22 @@ def estimated_normals(points: Array, neighbours: int) -> Array:
     sampled.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
     normals = np.asarray(sampled.normals).copy()
     return np.asarray(normals * np.where(normals[:, 2:] < 0, -1.0, 1.0))
+
+
+def closest_on_mesh(vertices: Array, faces: IntArray) -> Callable[[Array], tuple[Array, Array]]:
+    """Return a function from points (N, 3) to their feet (N, 3) on a mesh and the triangles' unit normals there."""
+    o3d = open3d()
+    middle = vertices.mean(axis=0)  # single precision inside: keep numbers small
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        o3d.core.Tensor(np.ascontiguousarray(vertices - middle, dtype=np.float32)),
+        o3d.core.Tensor(np.ascontiguousarray(faces, dtype=np.uint32)),
+    )
+
+    def find(points: Array) -> tuple[Array, Array]:
+        found = scene.compute_closest_points(o3d.core.Tensor(np.ascontiguousarray(points - middle, dtype=np.float32)))
+        foot = found["points"].numpy().astype(np.float64) + middle
+        normal = found["primitive_normals"].numpy().astype(np.float64)
+        return foot, normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+
+    return find

@@ -111,7 +111,7 @@ class GridFit:
                 rows, cols = slice(0, kx - dx), slice(max(0, -dy), ky - max(0, dy))
                 block[rows, cols] = value[rows, cols]
                 flat = block.ravel()
-                bands[width - shift, shift:] = flat[: kx * ky - shift]
+                bands[width - shift, shift:] += flat[: kx * ky - shift]  # narrow grids share bands
         return bands
 
 
