@@ -73,15 +73,23 @@ class BenchCell:
         vertices = centre + scale * (mesh.vertices - centre) + error[:, None] * mesh.normals
         return SurfaceMesh.from_triangles(vertices, mesh.faces, np.full(len(vertices), 1e-3 * CAMERA_UM))
 
+    def true_lift_off(self, plan: ScanPlan) -> Array:
+        """Return the true lift-off (N,) [mm] that a plan's readings would have."""
+        return self.part.closest(self._true_places(plan)[1], iterations=5)[2]
+
+    def _true_places(self, plan: ScanPlan) -> tuple[Array, Array]:
+        """Return where the axes say the coil is [mm, stage] and where it really is [mm, part]."""
+        target = apply(self.T_believed, plan.T_part_probe[plan.is_scan, :3, 3])
+        error = np.stack([1e-3 * STAGE_UM * field(target[:, 0], target[:, 1]) for field in self.stage_error], axis=1)
+        error += 1e-3 * STAGE_NOISE_UM * self.rng.standard_normal(target.shape)
+        return target, apply(invert(self.T_stage_part), target + error)
+
     def scan(self, plan: ScanPlan) -> tuple[ScanRecord, Array]:
         """Return the record of a plan and the true lift-off (N,) [mm] at its readings."""
         scan = plan.is_scan
-        face, axis = plan.T_part_probe[scan, :3, 3], plan.T_part_probe[scan, :3, 2]
-        target = apply(self.T_believed, face)
-        error = np.stack([1e-3 * STAGE_UM * field(target[:, 0], target[:, 1]) for field in self.stage_error], axis=1)
-        error += 1e-3 * STAGE_NOISE_UM * self.rng.standard_normal(target.shape)
-        true = apply(invert(self.T_stage_part), target + error)
-        foot, normal, distance = self.part.closest(true)
+        axis = plan.T_part_probe[scan, :3, 2]
+        target, true = self._true_places(plan)
+        foot, normal, distance = self.part.closest(true, iterations=5)
         tilt = np.degrees(np.arccos(np.clip(-(axis * normal).sum(axis=1), -1, 1)))
         heard = self._heard(foot, normal, distance, tilt)
         n = len(target)
@@ -180,8 +188,8 @@ def _curvature(part: NominalPart, foot: Array) -> Array:
     first = np.cross(normal, [0.0, 1.0, 0.0])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     for direction in (first, np.cross(normal, first)):
-        _, ahead, _ = part.closest(foot + step * direction)
-        _, behind, _ = part.closest(foot - step * direction)
+        _, ahead, _ = part.closest(foot + step * direction, iterations=4)
+        _, behind, _ = part.closest(foot - step * direction, iterations=4)
         total += ((ahead - behind) * direction).sum(axis=1) / (2 * step)
     return total
 

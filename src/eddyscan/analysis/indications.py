@@ -14,6 +14,8 @@ from eddyscan.core.indication import Indication
 
 SAME_SIDE = 0.3
 LEAST_READINGS = 2
+FLANK_MM = 1.0
+HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def _indication(number: int, signals: Signals, members: IntArray) -> Indication:
     score = signals.score[members]
     weight = score**2
     foot = signals.foot_mm[members]
-    centre = (weight[:, None] * foot).sum(axis=0) / weight.sum()
+    centre = _centre(signals, members)
     extent, angle = _extent(foot, weight, signals, members)
     strongest = members[int(np.argmax(np.abs(signals.residual_ohm[members])))]
     peak = signals.residual_ohm[strongest]
@@ -94,6 +96,18 @@ def _indication(number: int, signals: Signals, members: IntArray) -> Indication:
         phase_deg=float(np.degrees(np.angle(peak))),
         snr=float(score.max()),
     )
+
+
+def _centre(signals: Signals, members: IntArray) -> Array:
+    """Return the score's centroid (3,) over all readings at the indication above half its peak.
+
+    A weak indication has one or two readings above the call level; its flanks know its place better.
+    """
+    peak = float(signals.score[members].max())
+    away, _ = KDTree(signals.foot_mm[members]).query(signals.foot_mm, distance_upper_bound=FLANK_MM)
+    flank = np.isfinite(away) & (np.nan_to_num(signals.score) >= HALF * peak)
+    weight = signals.score[flank] ** 2
+    return np.asarray((weight[:, None] * signals.foot_mm[flank]).sum(axis=0) / weight.sum())
 
 
 def _extent(foot: Array, weight: Array, signals: Signals, members: IntArray) -> tuple[float, float]:
