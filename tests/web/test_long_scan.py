@@ -11,7 +11,7 @@ import pytest
 from tests.web.browser import Hand, chromium
 from tests.web.shelf_on_disk import behave
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(300)]
 READINGS = 20_000
 GROWTH_BYTES = 50e6
 

@@ -11,7 +11,7 @@ from eddyscan.formats.records import read_record
 from eddyscan.inspection import Inspection
 from tests.web.browser import Hand, chromium
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(400)]
 NAME = "walk"
 
 
