@@ -34,7 +34,7 @@ def draw_points() -> str:
         ("dome, geodesic", _planned(dome.mesh, "geodesic")),
         ("sinusoid with a 30 mm hole, geodesic", _planned(hole.mesh, "geodesic")),
     ]
-    figure = plt.figure(figsize=(13, 4.2), dpi=80)
+    figure = plt.figure(figsize=(11.5, 3.8), dpi=66)
     for k, (title, result) in enumerate(shown, start=1):
         axes = figure.add_subplot(1, 3, k, projection="3d")
         scan = result.is_scan

@@ -73,5 +73,5 @@ def test_encircling_a_dome_keeps_rings_a_pitch_apart_on_the_surface():
     result = plan(
         named_part("dome").top_mesh(1.0), technique(strategy="encircle", machine="pose", margin_mm=3.0), allow_gaps=True
     )
-    assert result.coverage.swept > 0.97
-    assert abs(result.coverage.row_distance_mm[1] - 5.0) < 0.3
+    assert result.coverage.swept > 0.995
+    assert result.coverage.row_distance_mm[2] < 5.5

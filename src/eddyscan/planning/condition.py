@@ -99,7 +99,11 @@ def _with_area(vertices: Array, faces: IntArray, notes: list[str]) -> IntArray:
     twice = np.linalg.norm(face_vectors(vertices, faces), axis=1)
     longest = np.max([np.linalg.norm(vertices[i] - vertices[j], axis=1) for i, j in ((a, b), (b, c), (c, a))], axis=0)
     good = (a != b) & (b != c) & (c != a) & (twice > 1e-6 * longest**2) & (longest > 0)
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    low, middle, high = np.sort(faces, axis=1).T
+    # Two keys of two vertices each: one sort of numbers instead of one of rows.
+    order = np.lexsort((low * (len(vertices) + 1) + middle, high))
+    same = (np.diff(high[order]) == 0) & (np.diff(middle[order]) == 0) & (np.diff(low[order]) == 0)
+    first = order[np.append(True, ~same)]
     single = np.zeros(len(faces), dtype=bool)
     single[first] = True
     for bad, what in ((~good, "without area"), (good & ~single, "given twice")):

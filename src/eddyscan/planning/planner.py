@@ -86,6 +86,8 @@ def _rows(
 ) -> tuple[list[PlannedPatch], list[Uncovered]]:
     """Return the rows of every patch, and the zones left out with their reasons."""
     pitch = setting.technique.plan.pitch_mm
+    # The field of a coil reaches about a millimetre beyond it: wider fits would bridge what it sees.
+    footprint = min(pitch, 2 * setting.technique.probe.outer_radius_mm + 2.0)
     patches, zones = setting.patches()
     access = setting.access()
     planned, split_edges = [], 0
@@ -93,7 +95,7 @@ def _rows(
         progress("planning rows", k, len(patches))
         patch, split = whole.refined(max(1.5, 0.3 * pitch))
         split_edges += split
-        surface = smoothed(patch.vertices, patch.faces, pitch, spacing_mm=spacing_mm)
+        surface = smoothed(patch.vertices, patch.faces, footprint, spacing_mm=spacing_mm)
         guards = setting.guards(patch, surface)
         laid = planned_patch(surface, setting.technique, combined(guards, len(surface.vertices)), access)
         if laid is None:

@@ -113,6 +113,10 @@ class Setting:
         if self.heights is not None:
             guards.append(Guard(_steep(self.tilt_limit_deg), tilt_guard(surface, self.tilt_limit_deg)))
             guards.append(Guard("hidden from above", hidden_guard(surface, self.heights)))
+        departure = np.linalg.norm(surface.vertices - patch.vertices, axis=1)
+        bridged = 0.5 * self.technique.analysis.lift_off_max_mm + 4 * surface.noise_mm
+        if (departure > bridged).any():
+            guards.append(Guard("too tight a radius: the footprint bridges it", bridged - departure))
         if self.travel_mm is not None:
             headroom = self.technique.scan.clearance_mm + self.technique.scan.lift_off_mm
             box = np.stack([self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)])
