@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from eddyscan.core.frames import Array
-from eddyscan.core.technique import Crop
 from eddyscan.surface.axes import align
 from eddyscan.surface.outline import Outline, trace_outline
 from eddyscan.surface.part_finder import CELL_MM, OBJECT_MM, PartRegion, find_part
@@ -38,7 +37,7 @@ class PartFrame:
         return low, self.size_mm + margin_mm
 
 
-def locate_part(views: Sequence[View], crop: Crop | None = None) -> PartFrame:
+def locate_part(views: Sequence[View]) -> PartFrame:
     """Find the part, its outline and its frame."""
     region = find_part(views)
     margin = 6.0
@@ -52,7 +51,6 @@ def locate_part(views: Sequence[View], crop: Crop | None = None) -> PartFrame:
     warnings = list(axes.warnings)
     if region.rivals:
         warnings.append("other objects could be the part: " + "; ".join(region.rivals) + ". Clear the table or crop.")
-    del crop
     return PartFrame(T, np.array([*axes.size_mm, region.size_mm[2]]), outline.moved(axes.T_part_box), tuple(warnings))
 
 

@@ -15,6 +15,7 @@ from eddyscan.core.mesh import SurfaceMesh
 from eddyscan.core.progress import Progress, silent
 from eddyscan.core.registration import Registration
 from eddyscan.core.technique import Surface
+from eddyscan.surface.crop import cropped
 from eddyscan.surface.fusion import cells_inside, collect_cells, fuse, is_height_field
 from eddyscan.surface.height_field import rough_height
 from eddyscan.surface.part_frame import PartFrame, locate_part
@@ -92,14 +93,15 @@ def reconstruct(
     registered = register(images, prepared, progress=progress)
     used = [v for v in registered.views if v is not None]
     progress("finding the part", 0, 1)
-    part = locate_part(used, settings.crop)
+    part = locate_part(used)
     used, part, information = _sharpened(used, part, registered)
     weak = weak_directions(information, registered, part)
     progress("finding the part", 1, 1)
     surface = fuse(used, part, settings, progress=progress)
     warnings = (*registered.warnings, *refuse_slides(weak), *part.warnings, *surface.warnings)
+    mesh = surface.mesh if settings.crop is None else cropped(surface.mesh, settings.crop)
     cloud = _merged_cloud(used, part)
-    return Reconstruction(surface.mesh, _in_part_frame(registered, used, part, weak), cloud, warnings, surface.method)
+    return Reconstruction(mesh, _in_part_frame(registered, used, part, weak), cloud, warnings, surface.method)
 
 
 def _refuse_mixed(views: Sequence[DepthImage | PointCloud]) -> None:
