@@ -76,6 +76,21 @@ def test_points_too_far_apart_for_a_crest_are_found_with_the_mesh():
         check(plan, tall, low, technique(), mesh=block)
 
 
+def test_a_corrected_plan_carries_its_mesh_along_but_not_far():
+    block, plan = named_part("block-a").top_mesh(2.0), wavy_plan(rows=1, points=41, length_mm=160.0)
+    scan = np.flatnonzero(plan.is_scan)
+    heights = 30.0 + 7.5 * np.sin(2 * np.pi * plan.T_part_probe[scan, 0, 3] / 150.0)
+    plan.T_part_probe[scan, 1, 3], plan.T_part_probe[scan, 2, 3] = 50.0, heights + 0.5 - 0.8
+    plan.T_part_probe[~plan.is_scan, :3, 3] = [0.0, 50.0, 38.0]
+    low = T_STAGE_PART.copy()
+    low[2, 3] = -10.0
+    tall = (AXES[0], AXES[1], Axis("z", 0.0, 60.0, 1e-4, 24.0, 200.0))
+    check(plan, tall, low, technique(), mesh=block)
+    plan.T_part_probe[scan, 2, 3] -= 1.0
+    with pytest.raises(TravelError, match=r"expects the surface -1\.8\d mm from where the mesh has it \(limit 1\.5\)"):
+        check(plan, tall, low, technique(), mesh=block)
+
+
 def test_a_clamp_in_the_way_of_the_probes_body_is_refused():
     clamp = KeepOut("left clamp", (20.0, 30.0, 0.0), (30.0, 37.0, 30.0))
     with pytest.raises(TravelError, match=r"enter the keep-out zone 'left clamp' by \d\.\d\d mm \(limit 0\)"):

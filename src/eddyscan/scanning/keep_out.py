@@ -17,6 +17,7 @@ from eddyscan.core.technique import Probe
 SAMPLE_MM = 1.0
 NARROW = 1e-3  # width over length below which spots lie on one line
 UPWARD = 0.2  # least z of a normal that belongs to the inspected side
+MOST_CORRECTED_MM = 1.5  # how far a plan's surface may lie from the mesh it was made on
 TOUCH_MM = 0.05  # a chord may come this much nearer than zero: the mesh's own roughness
 
 
@@ -97,12 +98,27 @@ def _along_the_way(targets: Array) -> tuple[Array, IntArray]:
 
 def _surface_height(plan: ScanPlan, T_stage_part: Array, mesh: SurfaceMesh | None) -> Callable[[Array], Array]:
     """Return a function from places (M, 2) to heights of the surface [mm, stage]; NaN where it is not known."""
-    if mesh is None:  # where the plan expects the surface: a corrected plan knows better than its first estimate
-        probe = plan.T_part_probe[plan.is_scan]
-        spots = probe[:, :3, 3] + plan.lift_off_mm[plan.is_scan, None] * probe[:, :3, 2]
-    else:
-        spots = mesh.vertices[mesh.normals[:, 2] > UPWARD]
-    spots = apply(T_stage_part, spots)
+    probe = plan.T_part_probe[plan.is_scan]
+    spots = apply(T_stage_part, probe[:, :3, 3] + plan.lift_off_mm[plan.is_scan, None] * probe[:, :3, 2])
+    expected = _interpolated(spots)
+    if mesh is None:
+        return expected
+    shape = _interpolated(apply(T_stage_part, mesh.vertices[mesh.normals[:, 2] > UPWARD]))
+    off = spots[:, 2] - shape(spots[:, :2])
+    off = np.where(np.isfinite(off), off, 0.0)
+    worst = int(np.abs(off).argmax())
+    if abs(off[worst]) > MOST_CORRECTED_MM:
+        raise TravelError(
+            f"the plan expects the surface {off[worst]:+.2f} mm from where the mesh has it (limit "
+            f"{MOST_CORRECTED_MM:g}) at x = {spots[worst, 0]:.1f}, y = {spots[worst, 1]:.1f} mm. "
+            "Align the part again, or make the plan again."
+        )
+    moved = _interpolated(np.column_stack([spots[:, :2], off]))  # a corrected plan knows better where the mesh lies
+    return lambda places: shape(places) + np.nan_to_num(moved(places))
+
+
+def _interpolated(spots: Array) -> Callable[[Array], Array]:
+    """Return heights between spots (N, 3) as a function of places (M, 2); NaN beyond them."""
     centre = spots[:, :2].mean(axis=0)
     _, extent, directions = np.linalg.svd(spots[:, :2] - centre, full_matrices=False)
     if len(spots) > 2 and extent[1] > NARROW * extent[0]:
