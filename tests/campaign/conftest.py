@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -35,11 +34,11 @@ def _own_cache(monkeypatch: pytest.MonkeyPatch, table_cache: Path) -> None:
 
 
 @pytest.fixture
-def small_tables(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def small_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     """Crack tables too coarse to trust and quick to build."""
     for name, count in (("ALONG", 9), ("ACROSS", 9), ("HEIGHTS", 4)):
         monkeypatch.setattr(library, name, count)
-    yield
+    return
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ MAX_BATCH = 25
 RETRIES = 3
 DASK_SETTINGS = {"distributed.scheduler.allowed-failures": 10, "distributed.comm.timeouts.connect": "10s"}
 WORKER_MEMORY = "2GiB"
+REACH_TIMEOUT_S = 10
 
 
 def run_batches(
@@ -139,9 +140,9 @@ def _reached(scheduler: str) -> Any:
 
     client = None
     try:
-        client = Client(scheduler, timeout="10s")
+        client = Client(scheduler, timeout=REACH_TIMEOUT_S)
         client.get_versions(check=True)
-        client.wait_for_workers(1, timeout=10)
+        client.wait_for_workers(1, timeout=REACH_TIMEOUT_S)
         there, here = set(client.run(_eddyscan_version).values()), _eddyscan_version()
         if there != {here}:
             raise ValueError(f"its workers have eddyscan {', '.join(sorted(there))}, here is {here}")

@@ -95,6 +95,6 @@ def _shared_grid(coil: Coil, longest_mm: float, highest_mm: float) -> TableGrid:
 def _between(nodes: Array, values: NDArray[np.complex128], at: float) -> NDArray[np.complex128]:
     """Interpolate the first axis by a cubic through all nodes; one node is the value itself."""
     if len(nodes) == 1:
-        return values[0]
+        return np.asarray(values[0])
     weights = make_interp_spline(nodes, np.eye(len(nodes)), k=3)(at)
     return np.asarray(np.tensordot(np.asarray(weights), values, axes=1))
