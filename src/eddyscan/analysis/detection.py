@@ -38,11 +38,13 @@ class Match:
     Attributes
     ----------
     score : (M,) largest over all angles, in robust standard deviations
+    whole : (M,) the same without the local mean taken out: better at the place, worse at telling humps
     angle_deg : (M,) of the best crack direction against the surface's x, 0 to 180
     """
 
     score: Array
     angle_deg: Array
+    whole: Array
 
 
 def match_cracks(
@@ -59,13 +61,13 @@ def match_cracks(
     lift_off_mm : float [mm] typical lift-off of the scan
     """
     known = np.flatnonzero(np.isfinite(across_ohm))
-    score, angle = np.full(len(across_ohm), np.nan), np.full(len(across_ohm), np.nan)
+    score, angle, whole = (np.full(len(across_ohm), np.nan) for _ in range(3))
     reach = REACH_IN_OUTER_RADII * response.coil.outer_radius_mm
     first, second, distance, bearing = _neighbours(foot_mm[known], normal[known], reach)
     weight = _profile(response, lift_off_mm, reach, distance)
-    best, best_angle = _strongest(across_ohm[known], first, second, weight, bearing)
-    score[known], angle[known] = best, best_angle
-    return Match(score, angle)
+    best, best_angle, best_whole = _strongest(across_ohm[known], first, second, weight, bearing)
+    score[known], angle[known], whole[known] = best, best_angle, best_whole
+    return Match(score, angle, whole)
 
 
 def field_power(response: SoundResponse, lift_off_mm: float, distance_mm: Array) -> Array:
@@ -101,7 +103,7 @@ def _neighbours(foot_mm: Array, normal: Array, reach_mm: float) -> tuple[IntArra
 
 def _strongest(
     channel: Array, first: IntArray, second: IntArray, weight: Array, bearing: ComplexArray
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     n = len(channel)
 
     def around(value: Array, *, of: Array | None = None) -> Array:
@@ -122,7 +124,7 @@ def _strongest(
     level = (around(np.ones_like(weight), of=channel) + channel) / count
     sum_0, sum_2 = around(weight), around(weight * cosine) + 1j * around(weight * sine)
     angles = np.arange(ANGLES) * np.pi / ANGLES
-    scores = np.empty((ANGLES, n))
+    scores, wholes = np.empty((ANGLES, n)), np.empty((ANGLES, n))
     for row, angle in enumerate(angles):
         back = np.exp(-2j * angle)
         norm = 1.5 * power_0 + 2 * (power_2 * back).real + 0.5 * (power_4 * back**2).real
@@ -132,7 +134,7 @@ def _strongest(
         root = np.sqrt(np.maximum(norm, 1e-30))
         whole, level_free = matched / root, (matched - level * total) * root / left
         sigma = max(robust_sigma(whole[~alone]), 1e-300)
-        scores[row] = np.minimum(whole, level_free) / sigma
+        scores[row], wholes[row] = np.minimum(whole, level_free) / sigma, whole / sigma
     scores[:, alone] = 0.0
     best = scores.argmax(axis=0)
-    return scores[best, np.arange(n)], np.degrees(angles[best])
+    return scores[best, np.arange(n)], np.degrees(angles[best]), wholes.max(axis=0)

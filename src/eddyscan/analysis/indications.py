@@ -30,6 +30,8 @@ class Signals:
     residual_ohm : (M,) complex [ohm]
     score : (M,)
         Matched residual over its robust noise.
+    placing : (M,)
+        The score that is best at the place.
     callable : (M,) bool
         Covered, away from edges.
     noise_ohm : float [ohm] robust noise of the residual across the lift-off curve
@@ -40,6 +42,7 @@ class Signals:
     row: IntArray
     residual_ohm: ComplexArray
     score: Array
+    placing: Array
     callable: BoolArray
     noise_ohm: float
 
@@ -103,10 +106,10 @@ def _centre(signals: Signals, members: IntArray) -> Array:
 
     A weak indication has one or two readings above the call level; its flanks know its place better.
     """
-    peak = float(signals.score[members].max())
+    peak = float(signals.placing[members].max())
     away, _ = KDTree(signals.foot_mm[members]).query(signals.foot_mm, distance_upper_bound=FLANK_MM)
-    flank = np.isfinite(away) & (np.nan_to_num(signals.score) >= HALF * peak)
-    weight = signals.score[flank] ** 2
+    flank = np.isfinite(away) & (np.nan_to_num(signals.placing) >= HALF * peak)
+    weight = signals.placing[flank] ** 2
     return np.asarray((weight[:, None] * signals.foot_mm[flank]).sum(axis=0) / weight.sum())
 
 

@@ -230,6 +230,7 @@ def _signals(
         readings.row,
         1j * across * falling,
         match.score,
+        match.whole,
         near & inside,
         robust_sigma(across),
     )
