@@ -132,10 +132,14 @@ def test_a_lost_scheduler_is_one_message_and_rows_that_came_are_kept(monkeypatch
     monkeypatch.setitem(engine.DASK_SETTINGS, "distributed.comm.timeouts.connect", "2s")
     with cluster() as here:
         came: list[dict[str, Any]] = []
-        with pytest.raises(WorkError, match=r"the Dask scheduler was lost .*repeat the command: it goes on"):
+
+        def until_lost() -> None:
             for batch in run_batches(slow_rows, 0.1, cases(200), workers=2, scheduler=here.address):
-                came += batch
+                came.extend(batch)
                 here.scheduler.kill()
+
+        with pytest.raises(WorkError, match=r"the Dask scheduler was lost .*repeat the command: it goes on"):
+            until_lost()
     numbers = [row["case"] for row in came]
     assert numbers
     assert len(set(numbers)) == len(numbers)

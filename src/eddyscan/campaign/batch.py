@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eddyscan.campaign.engine import run_batches
-from eddyscan.core.errors import EddyscanError, InputError
+from eddyscan.core.errors import InputError
 from eddyscan.core.progress import Progress, silent
 
 BATCH_STEPS = ("surface", "plan", "cscan", "report", "run")
@@ -57,7 +57,7 @@ def _do_folder(step: str, case: Mapping[str, Any]) -> dict[str, Any]:
             pipeline.run(Path(case["folder"]))
         else:
             pipeline.single_step(Path(case["folder"]), step)
-    except (EddyscanError, OSError, MemoryError) as fault:
+    except Exception as fault:  # whatever it is, it is this folder's alone
         error = f"{type(fault).__name__}: {fault}"
     seconds = round(time.perf_counter() - started, 3)
     return {"case": case["case"], "folder": case["folder"], "ok": not error, "seconds": seconds, "error": error}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,8 @@ def run_campaign(
     """
     campaign = read_toml(file, Campaign)
     cases = _cases(campaign)
-    store = RowStore(out, {"campaign_sha256": sha256_of_value(campaign), "name": campaign.campaign.name})
+    identity = {"campaign_sha256": sha256_of_value(campaign), "name": campaign.campaign.name}
+    store = RowStore(out, identity | {"eddyscan": version("eddyscan")})
     with store.owned():
         done = store.done()
         missing = [case for case in cases if case["case"] not in done]

@@ -56,22 +56,12 @@ def run_signal_case(shared: SignalShared, case: Mapping[str, Any]) -> dict[str, 
     """
     began = time.perf_counter()
     draw = np.random.default_rng(case["seed"])
-    raster = _Raster(case, draw)
-    technique = _technique_of(shared.technique, case)
+    raster = FlatField(case, draw)
+    technique = raster.technique(shared.technique)
     record = raster.record(shared, technique)
     result = analyse(record, raster.mesh(), technique)
     seconds = {"seconds": round(time.perf_counter() - began, 4)}
     return dict(case) | raster.outcome(result, technique) | {"readings": len(record)} | seconds
-
-
-def _technique_of(technique: Technique, case: Mapping[str, Any]) -> Technique:
-    drive = technique.drive.model_copy(update={"frequency_hz": case["frequency_hz"]})
-    scan = technique.scan.model_copy(update={"lift_off_mm": case["lift_off_mm"]})
-    # The probe of a flat raster stands on the normal: there is no tilt to find, which halves the analysis.
-    plan = technique.plan.model_copy(
-        update={"pitch_mm": case["pitch_mm"], "step_mm": case["step_mm"], "machine": "pose"}
-    )
-    return technique.model_copy(update={"drive": drive, "scan": scan, "plan": plan})
 
 
 @lru_cache(maxsize=8)
@@ -85,7 +75,7 @@ def _flat_mesh(side_mm: float) -> SurfaceMesh:
     return SurfaceMesh.from_triangles(np.stack([x, y, np.zeros_like(x)], axis=1), faces)
 
 
-class _Raster:
+class FlatField:
     """A square field of readings with one slot somewhere in its inner part."""
 
     def __init__(self, case: Mapping[str, Any], draw: np.random.Generator) -> None:
@@ -107,6 +97,16 @@ class _Raster:
             mode="reflect",
         )
         return np.asarray(smooth / smooth.std() * self.case["lift_off_sd_mm"]).ravel()
+
+    def technique(self, base: Technique) -> Technique:
+        """Return the base technique with the case's frequency, lift-off and raster."""
+        case = self.case
+        drive = base.drive.model_copy(update={"frequency_hz": case["frequency_hz"]})
+        scan = base.scan.model_copy(update={"lift_off_mm": case["lift_off_mm"]})
+        # The probe of a flat raster stands on the normal: there is no tilt to find, which halves the analysis.
+        raster = {"pitch_mm": case["pitch_mm"], "step_mm": case["step_mm"], "machine": "pose"}
+        plan = base.plan.model_copy(update=raster)
+        return base.model_copy(update={"drive": drive, "scan": scan, "plan": plan})
 
     def mesh(self) -> SurfaceMesh:
         """Return the field's flat surface, meshed as finely as a flat one needs."""
