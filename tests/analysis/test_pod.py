@@ -25,6 +25,26 @@ def test_the_same_from_hits_and_misses():
     assert curve.a90_mm < curve.a90_95_mm
 
 
+def test_a_noise_floor_and_saturation_do_not_bend_the_curve():
+    seen = np.clip(SIGNAL, 3.0, 20.0)
+    curve = pod_from_signals(SIZES, seen, threshold=6.0, basis="simulated", limits=(3.0, 20.0))
+    assert curve.a90_mm == pytest.approx(TRUE_A90, rel=0.04)
+    assert curve.a90_mm < curve.a90_95_mm < 1.15 * curve.a90_mm
+    bent = pod_from_signals(SIZES, seen, threshold=6.0, basis="simulated")
+    assert abs(bent.a90_mm / TRUE_A90 - 1) > 0.04
+
+
+def test_the_censored_confidence_limit_holds_in_19_of_20():
+    held = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        size = np.exp(rng.uniform(np.log(0.3), np.log(3.0), 60))
+        signal = np.exp(1.5 + 1.6 * np.log(size) + 0.3 * rng.standard_normal(60))
+        curve = pod_from_signals(size, signal, threshold=6.0, basis="-", limits=(3.0, 20.0))
+        held += curve.a90_95_mm > TRUE_A90
+    assert 0.86 <= held / 60 < 1.0
+
+
 def test_the_confidence_limit_holds_in_19_of_20():
     held = 0
     for seed in range(60):

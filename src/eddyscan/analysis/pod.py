@@ -49,7 +49,9 @@ class PodCurve:
         return np.asarray(norm.cdf((np.log(size_mm) - self.mu) / self.sigma))
 
 
-def pod_from_signals(size_mm: Array, signal: Array, *, threshold: float, basis: str) -> PodCurve:
+def pod_from_signals(
+    size_mm: Array, signal: Array, *, threshold: float, basis: str, limits: tuple[float, float] | None = None
+) -> PodCurve:
     """Fit log(signal) = b0 + b1 log(size) + normal scatter and turn it into a detection curve.
 
     Parameters
@@ -58,13 +60,18 @@ def pod_from_signals(size_mm: Array, signal: Array, *, threshold: float, basis: 
     threshold : float
         Call level in the signal's unit.
     basis : str
+    limits : (low, high), optional
+        Signals at or below `low` (noise alone reaches it) and at or above `high` (the
+        straight law ends) count as censored: only that they lie beyond is used.
 
     Raises
     ------
     InputError
-        Fewer than 8 signals, no spread of size, or a signal that does not grow with size.
+        Fewer than 8 uncensored signals, no spread of size, or a signal that does not grow with size.
     """
-    good = np.isfinite(signal) & (signal > 0) & (size_mm > 0)
+    sound = np.isfinite(signal) & (signal > 0) & (size_mm > 0)
+    low, high = limits or (0.0, np.inf)
+    good = sound & (signal > low) & (signal < high)
     if good.sum() < LEAST_SIZES or np.ptp(np.log(size_mm[good])) < 0.05:
         raise InputError(
             f"{int(good.sum())} usable signals at {len(np.unique(size_mm[good]))} sizes are too few for a detection "
@@ -77,12 +84,16 @@ def pod_from_signals(size_mm: Array, signal: Array, *, threshold: float, basis: 
     if b1 <= 0:
         raise InputError(f"the signal does not grow with size (slope {b1:.2f}); a detection curve needs one that does.")
     scatter = float(np.sqrt(((y - design @ fit) ** 2).sum() / (len(x) - 2)))
-    mu, sigma = (np.log(threshold) - b0) / b1, scatter / b1
-    spread = scatter**2 * np.linalg.inv(design.T @ design)
     full = np.zeros((3, 3))
-    full[:2, :2], full[2, 2] = spread, scatter**2 / (2 * len(x))
+    full[:2, :2], full[2, 2] = scatter**2 * np.linalg.inv(design.T @ design), scatter**2 / (2 * len(x))
+    method = "signal against size, delta method"
+    if (sound & ~good).any():
+        start = np.array([b0, b1, scatter])
+        (b0, b1, scatter), full = _censored(np.log(size_mm[sound]), signal[sound], (low, high), start)
+        method = "signal against size, censored, delta method"
+    mu, sigma = (np.log(threshold) - b0) / b1, scatter / b1
     slope = np.array([[-1 / b1, -mu / b1, 0.0], [0.0, -sigma / b1, 1 / b1]])
-    return _curve(float(mu), sigma, slope @ full @ slope.T, "signal against size, delta method", basis)
+    return _curve(float(mu), sigma, slope @ full @ slope.T, method, basis)
 
 
 def pod_from_hits(size_mm: Array, hit: BoolArray, *, basis: str) -> PodCurve:
@@ -112,6 +123,25 @@ def pod_from_hits(size_mm: Array, hit: BoolArray, *, basis: str) -> PodCurve:
     return _curve(mu, sigma, np.asarray(covariance), "hit or miss, maximum likelihood", basis)
 
 
+def _censored(x: Array, signal: Array, limits: tuple[float, float], start: Array) -> tuple[Array, Array]:
+    """Return (b0, b1, scatter) of greatest likelihood and their covariance (3, 3) (MIL-HDBK-1823A, G.3)."""
+    below, above = signal <= limits[0], signal >= limits[1]
+    y = np.log(np.clip(signal, *limits))
+
+    def cost(b0: float, b1: float, scatter: float) -> float:
+        z = (y - b0 - b1 * x) / scatter
+        known = norm.logpdf(z) - np.log(scatter)
+        return -float(np.where(below, norm.logcdf(z), np.where(above, norm.logsf(z), known)).sum())
+
+    def free(p: Array) -> float:
+        return cost(float(p[0]), float(p[1]), float(np.exp(p[2])))
+
+    first = np.array([start[0], start[1], np.log(start[2])])
+    best = minimize(free, first, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-9, "maxiter": 4000})
+    fit = np.array([best.x[0], best.x[1], np.exp(best.x[2])])
+    return fit, np.asarray(np.linalg.inv(_hessian(lambda p: cost(p[0], p[1], p[2]), fit)))
+
+
 def _curve(mu: float, sigma: float, covariance: Array, method: str, basis: str) -> PodCurve:
     a90 = mu + Z90 * sigma
     slope = np.array([1.0, Z90])
@@ -122,10 +152,11 @@ def _curve(mu: float, sigma: float, covariance: Array, method: str, basis: str) 
 
 def _hessian(cost: Callable[[Array], float], at: Array) -> Array:
     step = 1e-3 * np.maximum(np.abs(at), 0.1)
-    out = np.zeros((2, 2))
-    for i in range(2):
-        for j in range(2):
-            a, b = step[i] * np.eye(2)[i], step[j] * np.eye(2)[j]
+    n = len(at)
+    out = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            a, b = step[i] * np.eye(n)[i], step[j] * np.eye(n)[j]
             values = [cost(at + s * a + t * b) for s, t in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
             out[i, j] = (values[0] - values[1] - values[2] + values[3]) / (4 * step[i] * step[j])
     return out

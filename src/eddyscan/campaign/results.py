@@ -14,6 +14,8 @@ from eddyscan.core.errors import InputError
 from eddyscan.core.frames import Array
 
 LABEL = "simulation: physics and noise as assumed, no hardware"
+NOISE = 0.75  # times the call level: noise alone has its highest score of a flaw's readings below this
+STRAIGHT = 4.0  # times the call level: log score is straight in log length up to here
 OUTCOMES = ("found", "score", "surface_rmse_mm", "lift_off_sd_mm")
 
 
@@ -59,7 +61,9 @@ def _curves(rows: Sequence[Mapping[str, Any]], found: Any, figures: dict[str, An
     notes: list[str] = []
     fits: dict[str, Callable[[], PodCurve]] = {
         "hit_miss": lambda: pod_from_hits(sizes, found, basis=LABEL),
-        "signal": lambda: pod_from_signals(sizes, score, threshold=threshold, basis=LABEL),
+        "signal": lambda: pod_from_signals(
+            sizes, score, threshold=threshold, basis=LABEL, limits=(NOISE * threshold, STRAIGHT * threshold)
+        ),
     }
     for name, fit in fits.items():
         try:

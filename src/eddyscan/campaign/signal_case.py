@@ -65,11 +65,11 @@ def run_signal_case(shared: SignalShared, case: Mapping[str, Any]) -> dict[str, 
 
 
 @lru_cache(maxsize=8)
-def _flat_mesh(side_mm: float) -> SurfaceMesh:
-    count = max(2, round(side_mm / MESH_MM) + 1)
-    ticks = np.linspace(0.0, side_mm, count)
-    y, x = (grid.ravel() for grid in np.meshgrid(ticks, ticks, indexing="ij"))
-    index = np.arange(x.size).reshape(count, count)
+def flat_mesh(width_mm: float, height_mm: float, edge_mm: float = MESH_MM) -> SurfaceMesh:
+    """Return a flat rectangle at z = 0 with its corner at the origin."""
+    xs, ys = (np.linspace(0.0, side, max(2, round(side / edge_mm) + 1)) for side in (width_mm, height_mm))
+    y, x = (grid.ravel() for grid in np.meshgrid(ys, xs, indexing="ij"))
+    index = np.arange(x.size).reshape(len(ys), len(xs))
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
     return SurfaceMesh.from_triangles(np.stack([x, y, np.zeros_like(x)], axis=1), faces)
@@ -110,7 +110,7 @@ class FlatField:
 
     def mesh(self) -> SurfaceMesh:
         """Return the field's flat surface, meshed as finely as a flat one needs."""
-        return _flat_mesh(float(self.case["field_mm"]))
+        return flat_mesh(self.case["field_mm"], self.case["field_mm"])
 
     def record(self, shared: SignalShared, technique: Technique) -> ScanRecord:
         """Return what the instrument reads over the field."""
@@ -153,7 +153,8 @@ class FlatField:
         reach = NEAR_MM + 0.5 * self.case["flaw_length_mm"]
         distance = np.hypot(self.x - self.centre[0], self.y - self.centre[1])
         near = distance <= reach + technique.probe.outer_radius_mm
-        score = 0.0 if result.score is None else float(np.nan_to_num(result.score[near]).max())
+        # A call needs two readings above the level, so the second highest score decides.
+        score = 0.0 if result.score is None else float(np.sort(np.nan_to_num(result.score[near]))[-2])
         size = np.nan_to_num(np.abs(result.residual_ohm[near])).max()
         calls = [(np.hypot(*(np.array(i.centre_mm[:2]) - self.centre)), i) for i in result.indications]
         ours = min((call for call in calls if call[0] <= reach), key=lambda call: float(call[0]), default=None)
