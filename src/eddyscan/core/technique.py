@@ -135,10 +135,13 @@ class Scan(Section):
 
     mode: Literal["step", "row", "pvt"] = "step"
     alignment: Literal["field", "corner"] = Field(
-        "corner",
+        "field",
         description="field: the coil finds the part from the operator's rough corner; corner: the corner holds",
     )
     passes: Literal[1, 2] = Field(2, description="2: a coarse pass maps the lift-off, the fine one runs corrected")
+    coarse_lift_off_mm: float = Field(
+        0.2, ge=0, le=5, description="how much higher than the fine pass the coarse one runs"
+    )
     coarse_pitch_mm: float = Field(
         5.0, gt=0, description="row and point distance of the coarse pass, not below the plan's"
     )

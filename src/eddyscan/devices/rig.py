@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from eddyscan.core.errors import TechniqueError
 from eddyscan.core.frames import Array
 from eddyscan.core.mesh import SurfaceMesh
-from eddyscan.devices.clock import ScaledClock, WallClock
+from eddyscan.devices.clock import ScaledClock, VirtualClock, WallClock
 from eddyscan.devices.protocols import Clock, DepthCamera, EddyInstrument, Stage
 from eddyscan.devices.rig_settings import RigSettings, rig_text, virtual_rig
 
@@ -47,7 +47,7 @@ class Rig:
         self.settings = settings
         self.notes: list[str] = []
         world = settings.world
-        self.clock: Clock = WallClock() if world is None else ScaledClock(world.time_factor)
+        self.clock: Clock = WallClock() if world is None else _clock_of(world.time_factor)
         self._cell: VirtualCell | None = None
         self._stage: Stage | None = None
         self._instrument: EddyInstrument | None = None
@@ -141,6 +141,11 @@ class Rig:
             self.notes.append(note)
             LOG.warning(note)
         return device
+
+
+def _clock_of(time_factor: float) -> Clock:
+    """Return the cell's clock: virtual (repeatable, as fast as the computer) or so many times the wall's."""
+    return ScaledClock(time_factor) if time_factor > 0 else VirtualClock()
 
 
 def connect(kind: str, driver: str, address: str | None, options: dict[str, Any], *, clock: Clock) -> object:

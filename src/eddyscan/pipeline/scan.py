@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,15 +112,18 @@ class _Passes:
             sink.close()
 
     def _coarse_plan(self, plan: ScanPlan, mesh: SurfaceMesh) -> ScanPlan:
-        """Return the plan of the coarse pass: rows `coarse_pitch_mm` apart, or the plan itself when it is as coarse."""
+        """Return the coarse pass: rows `coarse_pitch_mm` apart, or the plan's when as coarse; raised, since untried."""
         from eddyscan.planning import plan as make_plan
 
         scan, wanted = self._technique.scan, self._technique.plan
         if wanted.pitch_mm >= scan.coarse_pitch_mm:
-            return plan
+            return raised(plan, scan.coarse_lift_off_mm)
         wider = {"pitch_mm": scan.coarse_pitch_mm, "step_mm": max(wanted.step_mm, scan.coarse_pitch_mm)}
         coarse = self._technique.model_copy(update={"plan": wanted.model_copy(update=wider)})
-        return self._kept(COARSE, lambda: make_plan(mesh, coarse, allow_gaps=True, progress=self._progress))
+        return self._kept(
+            COARSE,
+            lambda: raised(make_plan(mesh, coarse, allow_gaps=True, progress=self._progress), scan.coarse_lift_off_mm),
+        )
 
     def _fine_plan(self, plan: ScanPlan, mesh: SurfaceMesh) -> ScanPlan:
         """Return the plan moved to where the coarse pass found the metal."""
@@ -157,6 +161,13 @@ class _Passes:
             "inputs": inputs_of(self._inspection, "record"),
             "plan_sha256": sha256_of(self._inspection.file("plan", "plan.json")),
         } | calibration
+
+
+def raised(plan: ScanPlan, by_mm: float) -> ScanPlan:
+    """Return the plan with every pose drawn back along the probe's own axis."""
+    T = plan.T_part_probe.copy()
+    T[:, :3, 3] -= by_mm * T[:, :3, 2]
+    return replace(plan, T_part_probe=T, lift_off_mm=plan.lift_off_mm + by_mm * np.cos(np.radians(plan.tilt_deg)))
 
 
 def _points(plan: ScanPlan) -> set[tuple[int, int]]:

@@ -103,14 +103,18 @@ class TipShape:
 
 
 def tip_shape(probe: Probe) -> TipShape:
-    """Return the probe's underside: the tip (flat face or ball), its stem and the body's shoulder."""
-    R = probe.tip_radius_mm
+    """Return the probe's underside: the coil's face, the tip (flat or ball), its stem and the body's shoulder.
+
+    A coil wider than a ball tip's apex stands out of the ball: its rim is what touches on a slope.
+    """
+    R = max(probe.tip_radius_mm, probe.outer_radius_mm)
     rings = [np.zeros((1, 2))]
     for radius in np.linspace(0, R, 7)[1:]:
         rings.append(_ring(radius, 8 if radius < 0.5 * R else 24))
     tip = np.concatenate(rings)
     r2 = np.minimum((tip**2).sum(axis=1), R * R)
-    height = np.zeros(len(tip)) if probe.tip == "flat" else R - np.sqrt(R * R - r2)
+    ball = R - np.sqrt(R * R - r2)
+    height = np.where((probe.tip == "flat") | (r2 <= probe.outer_radius_mm**2), 0.0, ball)
     if probe.body_radius_mm <= R:
         return TipShape(tip, height)
     shoulder = np.concatenate([_ring(r, 24) for r in np.linspace(R, probe.body_radius_mm, 4)[1:]])

@@ -16,6 +16,7 @@ from eddyscan.planning.topology import border_loops
 
 LARGEST_OF_PATCH = 0.5
 SUPPORT = 240
+LEAST_SUPPORT = 8  # fewer vertices round a hole hold no plate; its cap is flat
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,8 @@ def _raised(vertices: Array, inner: Array, centre: Array, frame: tuple[Array, Ar
     u, v, n = frame
     reach = 1.6 * float(np.linalg.norm(inner, axis=1).max()) + 1e-9
     near = np.flatnonzero(np.linalg.norm(vertices - centre, axis=1) < reach)
+    if len(near) < LEAST_SUPPORT:
+        return np.asarray(centre + inner[:, :1] * u + inner[:, 1:] * v)
     near = near[:: max(1, len(near) // SUPPORT)]
     d = vertices[near] - centre
     plate = RBFInterpolator(np.stack([d @ u, d @ v], axis=1), d @ n, smoothing=1e-6)

@@ -13,6 +13,7 @@ from eddyscan.planning.heights import HeightMap, overlap_mm, tip_shape
 DOWN = np.array([0.0, 0.0, -1.0])
 RISES = 8
 TOUCH_MM = 0.002
+RIM_CLEARANCE_MM = 0.05  # the rim of a tilted face keeps this far off the surface
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,10 @@ def vertical_stance(points: Array, normals: Array, heights: HeightMap, probe: Pr
     shape = tip_shape(probe)
     lift = np.full(len(points), lift_off_mm)
     up = np.clip(normals[:, 2], 0.05, 1.0)
-    # On a plane the tip needs R (1 - cos) or R sin at once; curvature and edges are found by the map.
+    # On a plane a flat face of radius R needs R sin of the slope at once; curvature and edges are found by the map.
     slope = np.sqrt(np.maximum(1 - up**2, 0))
-    on_plane = probe.tip_radius_mm * (1 - up if probe.tip == "ball" else slope)
-    lift = np.maximum(lift, on_plane)
+    radius = probe.tip_radius_mm if probe.tip == "flat" else probe.outer_radius_mm
+    lift = np.maximum(lift, radius * slope + np.minimum(RIM_CLEARANCE_MM, slope))
     busy = np.arange(len(points))
     for _ in range(RISES):
         into = overlap_mm(heights, shape, points[busy] + lift[busy, None] * normals[busy])
@@ -54,14 +55,14 @@ def vertical_stance(points: Array, normals: Array, heights: HeightMap, probe: Pr
         if busy.size == 0:
             break
         lift[busy] += into[deep] * up[busy]
-    face = points + lift[:, None] * normals
+    face_mm = points + lift[:, None] * normals
     if busy.size:
         # Beside a wall the way along the normal may not clear: the rest is straight up.
-        into = np.maximum(overlap_mm(heights, shape, face[busy]), 0.0)
-        face[busy, 2] += into
+        into = np.maximum(overlap_mm(heights, shape, face_mm[busy]), 0.0)
+        face_mm[busy, 2] += into
         lift[busy] += into * up[busy]
     tilt = np.degrees(np.arccos(np.clip(normals[:, 2], -1, 1)))
-    return Stance(face, np.broadcast_to(DOWN, points.shape).copy(), lift, tilt)
+    return Stance(face_mm, np.broadcast_to(DOWN, points.shape).copy(), lift, tilt)
 
 
 def normal_stance(points: Array, normals: Array, lift_off_mm: float) -> Stance:

@@ -136,7 +136,10 @@ class WorldSettings(Section):
     part: str = "block-a"
     seed: int = Field(1, ge=0, description="draws poses, flaws and noise")
     time_factor: float = Field(
-        40.0, gt=0, le=1000, description="the cell's clock against the wall's; row and pvt scans need 5 or less"
+        0.0,
+        ge=0,
+        le=1000,
+        description="the cell's clock against the wall's, 0: as fast as it computes; row and pvt need 0, or 5 or less",
     )
     conductivity_ms_m: float = Field(19.0, gt=0.1, le=65.0, description="of the part, MS/m")
     clutter: int = Field(4, ge=0, le=12, description="other objects on the table")
