@@ -98,14 +98,14 @@ def _along_the_way(targets: Array) -> tuple[Array, IntArray]:
 
 def _surface_height(plan: ScanPlan, T_stage_part: Array, mesh: SurfaceMesh | None) -> Callable[[Array], Array]:
     """Return a function from places (M, 2) to heights of the surface [mm, stage]; NaN where it is not known."""
-    probe = plan.T_part_probe[plan.is_scan]
-    spots = apply(T_stage_part, probe[:, :3, 3] + plan.lift_off_mm[plan.is_scan, None] * probe[:, :3, 2])
+    face, normal = plan.T_part_probe[plan.is_scan, :3, 3], plan.normal[plan.is_scan]
+    spots = apply(T_stage_part, face - plan.lift_off_mm[plan.is_scan, None] * normal)
     expected = _interpolated(spots)
     if mesh is None:
         return expected
     shape = _interpolated(apply(T_stage_part, mesh.vertices[mesh.normals[:, 2] > UPWARD]))
     off = spots[:, 2] - shape(spots[:, :2])
-    off = np.where(np.isfinite(off), off, 0.0)
+    off = np.where(np.isfinite(off), off, 0.0) * normal[:, 2]  # along the normal: heights on a wall say little
     worst = int(np.abs(off).argmax())
     if abs(off[worst]) > MOST_CORRECTED_MM:
         raise TravelError(
