@@ -117,6 +117,7 @@ class Plan(Section):
     margin_mm: float = Field(3.0, ge=0, description="distance kept from the surface's edge, on the surface")
     density: Literal["constant", "adaptive"] = "constant"
     chord_error_mm: float = Field(0.05, gt=0, description="bound for density = adaptive")
+    tilt_max_deg: float = Field(80.0, gt=0, le=85, description="steepest slope for a vertical probe (machine xyz)")
     coverage_min: float = Field(0.95, ge=0, le=1, description="least swept coverage of the region inside the margin")
     regions_mm: tuple[tuple[tuple[float, float], ...], ...] = Field(
         (), description="outlines of what to scan, (x, y) corners in the part frame; none: all"

@@ -12,7 +12,7 @@ from eddyscan.core.commented_toml import commented_toml
 from eddyscan.core.errors import FileError, InputError
 from eddyscan.core.parts import PARTS, named_part
 from eddyscan.core.progress import Progress, silent
-from eddyscan.core.technique import Part, Technique
+from eddyscan.core.technique import Part, Plan, Technique
 from eddyscan.inspection import STEPS, Inspection, StepState
 from eddyscan.pipeline import rigs, steps
 from eddyscan.pipeline.control import ScanControl
@@ -21,6 +21,7 @@ from eddyscan.pipeline.states import states_of
 from eddyscan.pipeline.summary import write_summary
 from eddyscan.pipeline.write_report import write_report
 
+STEEP_DEG = 50.0  # a vertical coil on a steeper slope is a millimetre off and reads little
 TECHNIQUE_HEADING = """The written procedure of this inspection. Lengths in mm, angles in deg.
 A key you do not need can go: its default holds. An unknown key is an error."""
 
@@ -39,7 +40,7 @@ def new_inspection(folder: Path, *, part: str = "block-a", seed: int = 1) -> Ins
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder} is a file; name a folder.")
     inspection.step_folder("views").mkdir(parents=True, exist_ok=True)
-    technique = Technique(part=Part(name=part, nominal=part))
+    technique = Technique(part=Part(name=part, nominal=part), plan=Plan(tilt_max_deg=STEEP_DEG))
     inspection.technique_file.write_text(commented_toml(technique, TECHNIQUE_HEADING), encoding="utf-8")
     inspection.rig_file.write_text(rigs.virtual_rig_text(part, seed), encoding="utf-8")
     inspection.log("new", part=part, seed=seed)

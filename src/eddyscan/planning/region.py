@@ -10,6 +10,7 @@ from eddyscan.core.frames import Array, BoolArray, IntArray
 from eddyscan.core.mesh import face_vectors
 from eddyscan.core.technique import Probe
 from eddyscan.planning.patches import Patch
+from eddyscan.planning.probe_pose import RIM_CLEARANCE_MM
 from eddyscan.planning.topology import border_edges
 
 TRAVEL_RESERVE_MM = 0.5
@@ -17,11 +18,10 @@ TRAVEL_RESERVE_MM = 0.5
 
 def steepest_tilt_deg(probe: Probe, lift_off_max_mm: float) -> float:
     """Return the slope [deg] at which a vertical tip on a plane lifts the coil beyond the limit (at most 85)."""
-    ratio = lift_off_max_mm / probe.tip_radius_mm
+    face = probe.tip_radius_mm if probe.tip == "flat" else probe.outer_radius_mm
+    limit = np.degrees(np.arcsin(np.clip((lift_off_max_mm - RIM_CLEARANCE_MM) / face, 0, 1)))
     if probe.tip == "ball":
-        limit = np.degrees(np.arccos(np.clip(1 - ratio, 0, 1)))
-    else:
-        limit = np.degrees(np.arcsin(np.clip(ratio, 0, 1)))
+        limit = min(limit, np.degrees(np.arccos(np.clip(1 - lift_off_max_mm / probe.tip_radius_mm, 0, 1))))
     return float(min(limit, 85.0))
 
 

@@ -49,7 +49,8 @@ class Setting:
     @property
     def tilt_limit_deg(self) -> float:
         """Return the steepest slope [deg] a vertical tip reads."""
-        return steepest_tilt_deg(self.technique.probe, self.technique.analysis.lift_off_max_mm)
+        by_lift_off = steepest_tilt_deg(self.technique.probe, self.technique.analysis.lift_off_max_mm)
+        return min(by_lift_off, self.technique.plan.tilt_max_deg)
 
     def access(self) -> Access:
         """Return which spots the probe can read."""
