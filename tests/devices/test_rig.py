@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from eddyscan.core.errors import DeviceError, InputError, LinkError, TechniqueError
 from eddyscan.core.technique import Drive
-from eddyscan.devices.clock import ScaledClock, WallClock
+from eddyscan.devices.clock import VirtualClock, WallClock
 from eddyscan.devices.protocols import DepthCamera, EddyInstrument, Identity, Stage
 from eddyscan.devices.rig import RigSettings, connect, open_rig, rig_text, virtual_rig
 
@@ -104,7 +104,7 @@ def test_virtual_rig_homes_moves_and_reads_through_the_real_libraries():
     settings = virtual_rig("plate", seed=2)
     settings = settings.model_copy(update={"world": settings.world.model_copy(update={"flaws": "none"})})
     with open_rig(settings) as rig:
-        assert isinstance(rig.clock, ScaledClock)
+        assert isinstance(rig.clock, VirtualClock)
         assert isinstance(rig.stage, Stage)
         assert isinstance(rig.instrument, EddyInstrument)
         assert isinstance(rig.camera, DepthCamera)
