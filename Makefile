@@ -13,8 +13,10 @@ export OMP_NUM_THREADS ?= 2
 demo: .venv/.runtime
 	$(BIN)/eddyscan demo --out inspections/demo
 
+# The page's tests click as a person would, so they have the machine to themselves.
 test: .venv/.dev check
-	$(BIN)/pytest -n 2 --dist loadfile -q
+	$(BIN)/pytest -n 2 --dist loadfile -q --ignore tests/web
+	$(BIN)/pytest -q tests/web
 
 check: .venv/.dev
 	$(BIN)/ruff check .

@@ -54,7 +54,7 @@ def test_hundred_clicks_on_every_button_of_every_step(hand, inspection):
 
 
 def test_escape_stops_while_typing_and_two_browsers_see_it(hand, served, inspection):
-    behave(inspection, interval_s=0.03)
+    behave(inspection, interval_s=0.1)
     hand.open("plate-1/record")
     with chromium() as second:
         other = Hand(second, served.door.access.address("viewer"))

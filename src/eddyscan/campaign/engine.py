@@ -71,12 +71,14 @@ def _batches(cases: Batch, workers: int) -> list[Batch]:
 
 def _on_cluster(client: Any, function: CaseFunction, shared: Any, batches: Sequence[Batch]) -> Iterator[list[Row]]:
     """Yield rows; what the last holder of the shared tables took down with it is sent again."""
+    from distributed import CommClosedError
+
     pending = dict(enumerate(batches))
     for _ in range(RETRIES):
         try:
             yield from _one_round(client, function, shared, pending)
         except (OSError, TimeoutError) as error:
-            if client.status == "running":
+            if client.status == "running" and not isinstance(error, CommClosedError):
                 raise  # the case's own fault, not the cluster's
             raise _lost(error) from error
         if not pending:
