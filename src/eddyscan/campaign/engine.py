@@ -71,7 +71,7 @@ def _batches(cases: Batch, workers: int) -> list[Batch]:
 
 def _on_cluster(client: Any, function: CaseFunction, shared: Any, batches: Sequence[Batch]) -> Iterator[list[Row]]:
     """Yield rows; what the last holder of the shared tables took down with it is sent again."""
-    from distributed import CommClosedError
+    from distributed.comm import CommClosedError
 
     pending = dict(enumerate(batches))
     for _ in range(RETRIES):
