@@ -55,7 +55,9 @@ def _surface(axis: Any, cscan: Any, values: Array | None, label: str, title: str
     corners = (mesh.vertices @ VIEW_FROM.T)[faces]
     depth = (mesh.vertices @ np.array([0.4, -0.72, 0.55]))[faces].mean(axis=1)
     order = np.argsort(depth)
-    colours = np.nanmean(np.where(np.isfinite(shown), shown, np.nan)[faces], axis=1)
+    known = np.isfinite(shown[faces])
+    total = np.where(known, shown[faces], 0.0).sum(axis=1)
+    colours = np.divide(total, known.sum(axis=1), out=np.full(len(faces), np.nan), where=known.any(axis=1))
     patches = PolyCollection(corners[order], array=colours[order], cmap="viridis", edgecolors="face", linewidths=0.6)
     axis.add_collection(patches)
     axis.autoscale_view()
