@@ -18,7 +18,7 @@ NAME = "walk"
 def quick_cell(inspection: Inspection) -> None:
     """Make the virtual cell quick: fast clock, three views, coarse facets, one pass."""
     text = inspection.rig_file.read_text()
-    for key, value in {"time_factor": "40.0", "mesh_edge_mm": "2.0", "views": "3"}.items():
+    for key, value in {"time_factor": "20.0", "mesh_edge_mm": "2.0", "views": "3"}.items():
         text = re.sub(rf"^{key} = \S+", f"{key} = {value}", text, count=1, flags=re.M)
     inspection.rig_file.write_text(text)
     technique = inspection.technique_file.read_text()
