@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from eddyscan.core.errors import FileError, InputError, TechniqueError
+from eddyscan.core.plain import plain
 from eddyscan.core.technique import Technique
 from eddyscan.web import settings, uploads
 from eddyscan.web.decisions import decide, decisions
 from eddyscan.web.library import Library
-from eddyscan.web.link import framed, plain
+from eddyscan.web.link import framed
 from eddyscan.web.packing import KINDS, packed
 from tests.web.shelf_on_disk import analysed_inspection, planned_inspection
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,6 +12,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+
+from eddyscan.core.plain import plain
 
 messages = Console(stderr=True, highlight=False)
 SHOW_AFTER_S = 1.0
@@ -96,16 +97,3 @@ def emit_json(value: Mapping[str, Any]) -> None:
     """Print the command's one JSON object on standard output; NaN becomes null."""
     sys.stdout.write(json.dumps(plain(value), allow_nan=False, default=str) + "\n")
     sys.stdout.flush()
-
-
-def plain(value: Any) -> Any:
-    """Return `value` with numpy scalars and arrays as plain numbers and lists, NaN as None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
 import socket
 import threading
 from collections.abc import Iterator, Mapping
 from typing import Any
+
+from eddyscan.core.plain import plain
 
 
 def framed(message: Mapping[str, Any], payload: bytes = b"") -> bytes:
     """Return one message as bytes; NaN and infinity become null."""
     head = {**message, "bytes": len(payload)} if payload else dict(message)
     return json.dumps(plain(head), allow_nan=False, default=str).encode() + b"\n" + payload
-
-
-def plain(value: Any) -> Any:
-    """Return `value` with numpy scalars and arrays as plain numbers and lists, NaN as None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 class Link:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eddyscan.web.link import plain
+from eddyscan.core.plain import plain
 
 ALIGN = 8
 KINDS = {"f4": "float32", "f8": "float64", "u4": "uint32", "i4": "int32", "u1": "uint8"}
